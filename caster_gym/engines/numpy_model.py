@@ -1,0 +1,203 @@
+"""The mechanics on NumPy arrays."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
+from caster_gym.mechanics.integration import State, rk4_step
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
+from caster_gym.mechanics.scalars import Direction, Vector, each, pairs
+from caster_gym.robot import Robot, check_joints
+
+Array = NDArray[np.float64]
+
+
+class Model:
+    """Kinematics, dynamics, ground forces and impacts of a robot, on arrays whose leading axes are a batch.
+
+    steering (..., N): angles δ from the body x-axis to each rolling direction [rad]
+    twist (..., 3): vx, vy, ω at C in the body frame [m/s, m/s, rad/s]
+    torque (..., 2 N): at the joints roll_1, steer_1, roll_2, steer_2, … [N m]; given to every joint, driven or not
+    state (..., 6 + N): x, y [m], β [rad] in the world, twist, steering
+
+    dynamics="chung2008" leaves the term (D1) out of the bias, as that paper prints the model. parameters replaces the
+    robot's own numbers, for instance by arrays with one value per robot of the batch.
+    Source: docs/equations.md. Raises ValueError for arrays of the wrong last axis and for values that are not finite.
+    """
+
+    _arrays: Any = np
+
+    def __init__(self, robot: Robot, dynamics: Dynamics = "exact", parameters: RobotParameters | None = None) -> None:
+        self.robot = robot
+        self.dynamics = dynamics
+        self._parameters = robot_parameters(robot, dynamics) if parameters is None else parameters
+
+    def rates(self, steering: ArrayLike, twist: ArrayLike) -> tuple[Array, Array, Array]:
+        """Yaw rates over ground η̇, rolling rates θ̇, steering rates δ̇, each (..., N). [rad/s]"""
+        directions, v = self._directions(steering), self._vector("twist", twist)
+        eta, theta, delta = zip(*each(caster.rates, (v,), directions, self._parameters.casters), strict=True)
+        return self._stack(eta), self._stack(theta), self._stack(delta)
+
+    def jacobian(self, steering: ArrayLike, joints: str | Sequence[str] = "all") -> Array:
+        """Rows (..., J, 3) that give the rates of the named joints from the twist; joints in the order given."""
+        directions = self._directions(steering)
+        names = self.robot.joints if joints == "all" else check_joints(_listed(joints), self.robot.caster_count)
+        rows = each(caster.rate_rows, (), directions, self._parameters.casters)
+        chosen = [rows[self.robot.joints.index(name) // 2][1 + self.robot.joints.index(name) % 2] for name in names]
+        return self._stack([self._stack(row) for row in chosen], -2)
+
+    def inertia(self, steering: ArrayLike) -> Array:
+        """Inertia matrix M (..., 3, 3) of the whole robot at C, in B."""
+        xx, xy, xz, yy, yz, zz = dynamics.inertia(self._directions(steering), self._parameters)
+        rows = [self._stack(row) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
+        return self._stack(rows, -2)
+
+    def bias(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+        """Coriolis and centrifugal force h (..., 3) at C, in B."""
+        return self._stack(
+            dynamics.bias(self._vector("twist", twist), self._directions(steering), self._parameters)
+        )
+
+    def friction(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+        """Friction of joints and contact patches (..., 3) at C, in B, as the force that overcomes it."""
+        return self._stack(
+            dynamics.resistance(self._vector("twist", twist), self._directions(steering), self._parameters)
+        )
+
+    def forward_dynamics(
+        self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike, wrench: ArrayLike | None = None
+    ) -> Array:
+        """Twist rate (..., 3): derivative of the components of the twist in B. wrench (..., 3) acts at C, in B."""
+        directions, v = self._directions(steering), self._vector("twist", twist)
+        force = (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
+        return self._stack(dynamics.forward_dynamics(v, directions, self._torques(torque), force, self._parameters))
+
+    def inverse_dynamics(self, steering: ArrayLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
+        """Generalised force (..., 3) at C, in B, that drives and wrench must supply together, friction included."""
+        directions, v = self._directions(steering), self._vector("twist", twist)
+        return self._stack(
+            dynamics.inverse_dynamics(v, directions, self._vector("twist_rate", twist_rate), self._parameters)
+        )
+
+    def kinetic_energy(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+        """Kinetic energy (...) of all bodies. [J]"""
+        directions, v = self._directions(steering), self._vector("twist", twist)
+        return self._scalar(dynamics.kinetic_energy(v, directions, self._parameters))
+
+    def ground_forces(self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike) -> Array:
+        """Forces (..., N, 2) of the floor on each wheel along f and f⊥, under the given joint torques. [N]"""
+        directions, v, torques = self._directions(steering), self._vector("twist", twist), self._torques(torque)
+        v_rate = dynamics.forward_dynamics(v, directions, torques, (0.0, 0.0, 0.0), self._parameters)
+        forces = each(ground.ground_force, (v, v_rate), directions, self._parameters.casters, torques)
+        return self._stack([self._stack(force) for force in forces], -2)
+
+    def wheel_loads(self, steering: ArrayLike) -> Array:
+        """Normal forces (..., N) under the wheels of the robot at rest. [N]"""
+        return self._stack(ground.wheel_loads(self._directions(steering), self._parameters))
+
+    def conditioning(self, steering: ArrayLike) -> Array:
+        """σ_min / σ_max (...) of the wrenches of the driven motors; 0 where they cannot push the robot somewhere."""
+        return self._scalar(actuation.conditioning(self._directions(steering), self._parameters))
+
+    def collide(
+        self,
+        steering: ArrayLike,
+        twist: ArrayLike,
+        point: ArrayLike,
+        normal: ArrayLike,
+        restitution: ArrayLike,
+        friction: ArrayLike = 0.0,
+    ) -> tuple[Array, Array]:
+        """Impulse (..., 2), normal and tangential [N s], and the twist (..., 3) after an impact.
+
+        point (..., 2) [m] and normal (..., 2), a unit vector from the obstacle into the robot, in B. The tangent is
+        the normal turned by +90°. Nothing happens at a contact that separates.
+        """
+        p, n = self._components("point", point, 2), self._components("normal", normal, 2)
+        length = n[0] * n[0] + n[1] * n[1]
+        if bool((abs(length - 1.0) > 1e-6).any()):
+            raise ValueError(f"normal must be a unit vector, got a length of {float(length.max()) ** 0.5:g}")
+        e = self._in_range("restitution", restitution, 0.0, 1.0)
+        mu = self._in_range("friction", friction, 0.0, float("inf"))
+        directions, v = self._directions(steering), self._vector("twist", twist)
+        j_n, j_t, after = impulse.collide(v, directions, p, n, e, mu, self._parameters)
+        return self._stack((j_n, j_t)), self._stack(after)
+
+    def simulate(self, state: ArrayLike, torque: ArrayLike, dt: float, steps: int) -> Array:
+        """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
+
+        torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
+        Angles are continuous in time. Raises ValueError if dt [s] cannot follow the casters.
+        """
+        self.robot.check_time_step(dt)
+        if steps < 0:
+            raise ValueError(f"steps must be 0 or more, got {steps}")
+        x, y, beta, *others = self._components("state", state, 6 + self.robot.caster_count)
+        twist, steering = (others[0], others[1], others[2]), others[3:]
+        torques = self._array("torque", torque, 2 * self.robot.caster_count)
+        changing = torques.ndim > x.ndim + 1
+        if changing and len(torques) != steps:
+            raise ValueError(f"torque must hold {steps} steps along its first axis, got {len(torques)}")
+        now = State((x, y), self._unit(beta), twist, tuple(self._unit(angle) for angle in steering))
+        angles = [beta, *steering]
+        states = [self._stack((x, y, beta, *twist, *steering))]
+        for step in range(steps):
+            given = self._torques(torques[step] if changing else torques)
+            now = rk4_step(now, given, (0.0, 0.0, 0.0), dt, self._parameters)
+            angles = [self._follow(a, f) for a, f in zip(angles, (now.heading, *now.directions), strict=True)]
+            states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:])))
+        return self._stack(states, 0)
+
+    def _array(self, name: str, value: Any, last: int) -> Any:
+        """The value as an array of finite numbers whose last axis has the right length."""
+        array = np.asarray(value, dtype=np.float64)
+        self._check_shape(name, array, last)
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+        return array
+
+    @staticmethod
+    def _check_shape(name: str, array: Any, last: int) -> None:
+        if array.ndim == 0 or array.shape[-1] != last:
+            raise ValueError(f"{name} must have a last axis of {last}, got shape {tuple(array.shape)}")
+
+    def _components(self, name: str, value: Any, last: int) -> tuple[Any, ...]:
+        array = self._array(name, value, last)
+        return tuple(array[..., i] for i in range(last))
+
+    def _vector(self, name: str, value: Any) -> Vector:
+        x, y, z = self._components(name, value, 3)
+        return x, y, z
+
+    def _unit(self, angle: Any) -> Direction:
+        return self._arrays.cos(angle), self._arrays.sin(angle)
+
+    def _directions(self, steering: Any) -> tuple[Direction, ...]:
+        return tuple(self._unit(angle) for angle in self._components("steering", steering, self.robot.caster_count))
+
+    def _torques(self, torque: Any) -> tuple[tuple[Any, Any], ...]:
+        return pairs(self._components("torque", torque, 2 * self.robot.caster_count))
+
+    def _in_range(self, name: str, value: Any, low: float, high: float) -> Any:
+        number = self._array(name, self._arrays.asarray(value)[..., None], 1)[..., 0]
+        if bool(((number < low) | (number > high)).any()):
+            raise ValueError(f"{name} must lie in {low:g} … {high:g}, got {float(number.min()):g} … {float(number.max()):g}")
+        return number
+
+    def _follow(self, angle: Any, f: Direction) -> Any:
+        """The angle of a direction, on the turn nearest to the angle before."""
+        c, s = self._unit(angle)
+        return angle + self._arrays.atan2(f[1] * c - f[0] * s, f[0] * c + f[1] * s)
+
+    def _scalar(self, value: Any) -> Any:
+        return np.asarray(value)
+
+    def _stack(self, parts: Any, axis: int = -1) -> Any:
+        return np.stack(np.broadcast_arrays(*parts), axis)
+
+
+def _listed(joints: str | Sequence[str]) -> tuple[str, ...]:
+    return (joints,) if isinstance(joints, str) else tuple(joints)

@@ -1,0 +1,48 @@
+"""The mechanics on Torch tensors, eagerly and with gradients."""
+
+from typing import Any
+
+import torch
+
+from caster_gym.engines.numpy_model import Model
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters
+from caster_gym.mechanics.scalars import register
+from caster_gym.robot import Robot
+
+register(torch.Tensor, torch.where, torch.sqrt)
+
+
+class TorchModel(Model):
+    """`caster_gym.Model` for tensors of one floating-point type on one device; gradients pass through every method.
+
+    parameters may hold tensors, so that gradients with respect to the robot's own numbers exist too. Values are not
+    checked for being finite, since that would wait for the device.
+    """
+
+    _arrays: Any = torch
+
+    def __init__(
+        self,
+        robot: Robot,
+        dynamics: Dynamics = "exact",
+        parameters: RobotParameters | None = None,
+        dtype: torch.dtype = torch.float64,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        if dtype not in (torch.float32, torch.float64):
+            raise ValueError(f"dtype must be torch.float32 or torch.float64, got {dtype}")
+        super().__init__(robot, dynamics, parameters)
+        self.dtype = dtype
+        self.device = torch.device(device)
+
+    def _array(self, name: str, value: Any, last: int) -> Any:
+        tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)
+        self._check_shape(name, tensor, last)
+        return tensor
+
+    def _scalar(self, value: Any) -> Any:
+        return value
+
+    def _stack(self, parts: Any, axis: int = -1) -> Any:
+        tensors = [torch.as_tensor(part, dtype=self.dtype, device=self.device) for part in parts]
+        return torch.stack(torch.broadcast_tensors(*tensors), axis)

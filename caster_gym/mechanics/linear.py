@@ -1,0 +1,56 @@
+"""Vectors of three scalars and symmetric 3×3 matrices (xx, xy, xz, yy, yz, zz): the platform has three degrees of freedom."""
+
+from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, clip, maximum, sqrt, where
+
+NEWTON_STEPS = 5  # from 2 to a root in [√3, 2] of a cubic whose slope there is at least 6: below rounding
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def solve(m: Symmetric, b: Vector) -> Vector:
+    """x of M x = b for a symmetric positive definite M, by its L D Lᵀ factors."""
+    xx, xy, xz, yy, yz, zz = m
+    l_yx, l_zx = xy / xx, xz / xx
+    d_y, r_zy = yy - l_yx * xy, yz - l_yx * xz
+    l_zy = r_zy / d_y
+    d_z = zz - l_zx * xz - l_zy * r_zy
+    y = b[1] - l_yx * b[0]
+    z = (b[2] - l_zx * b[0] - l_zy * y) / d_z
+    y = y / d_y - l_zy * z
+    return b[0] / xx - l_yx * y - l_zx * z, y, z
+
+
+def multiply(m: Symmetric, v: Vector) -> Vector:
+    """M v."""
+    xx, xy, xz, yy, yz, zz = m
+    return (
+        xx * v[0] + xy * v[1] + xz * v[2],
+        xy * v[0] + yy * v[1] + yz * v[2],
+        xz * v[0] + yz * v[1] + zz * v[2],
+    )
+
+
+def extreme_eigenvalues(m: Symmetric) -> tuple[Scalar, Scalar]:
+    """Least and greatest eigenvalue of a symmetric matrix, without trigonometry.
+
+    With λ = p/3 + (R/3) z the characteristic polynomial becomes z³ − 3 z = 2 κ, |κ| <= 1. Of its three real roots one
+    lies apart from the others, |z| in [√3, 2]: Newton's steps from 2 find it, and the rest is a quadratic equation.
+    """
+    xx, xy, xz, yy, yz, zz = m
+    p = xx + yy + zz
+    q = (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz)
+    det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    third = sqrt(maximum(p * p - 3.0 * q, 0.0 * p)) / 3.0
+    cube = third * third * third
+    kappa = clip((p * p * p / 27.0 - q * p / 6.0 + 0.5 * det) / maximum(cube, 1e-300), -1.0, 1.0)
+    apart = where(kappa < 0.0, -kappa, kappa)
+    z = 2.0 + 0.0 * p
+    for _ in range(NEWTON_STEPS):
+        z = z - ((z * z - 3.0) * z - 2.0 * apart) / (3.0 * z * z - 3.0)
+    w = 0.5 * (z + sqrt(maximum(12.0 - 3.0 * z * z, 0.0 * z)))  # the root farthest from z is −w
+    low = where(kappa < 0.0, -z, -w)
+    high = where(kappa < 0.0, w, z)
+    return p / 3.0 + third * low, p / 3.0 + third * high

@@ -1,0 +1,127 @@
+"""The numbers that the equations need of a robot, flat: one scalar per field, so that a batch can hold a robot a lane.
+
+Meaning and signs: docs/equations.md, section P. SI units throughout.
+"""
+
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+from caster_gym.mechanics.scalars import Scalar
+from caster_gym.robot import Caster, Robot
+
+Dynamics: TypeAlias = Literal["exact", "chung2008"]
+
+GRAVITY = 9.81  # [m/s²]
+
+
+class PlatformParameters(NamedTuple):
+    """Platform without casters; mass centre in B, inertia about it."""
+
+    mass: Scalar  # [kg]
+    inertia: Scalar  # [kg m²]
+    com_x: Scalar  # [m]
+    com_y: Scalar  # [m]
+    floor_friction: Scalar  # [-] between the wheels and the floor
+
+
+class CasterParameters(NamedTuple):
+    """One powered caster."""
+
+    x: Scalar  # [m] pivot, in B
+    y: Scalar
+    trail: Scalar  # d [m]
+    offset: Scalar  # s [m]
+    radius: Scalar  # r [m]
+    wheel_mass: Scalar  # m_w [kg]
+    spin_inertia: Scalar  # I_s [kg m²]
+    yaw_inertia: Scalar  # I_d [kg m²]
+    link_mass: Scalar  # m_l [kg]
+    link_inertia: Scalar  # I_l [kg m²]
+    link_behind: Scalar  # l [m] mass centre behind the steering axis
+    link_left: Scalar  # q [m] and to its left
+    roll_armature: Scalar  # J_θ [kg m²]
+    steer_armature: Scalar  # J_δ [kg m²]
+    roll_viscous: Scalar  # [N m s/rad]
+    roll_coulomb: Scalar  # [N m]
+    steer_viscous: Scalar
+    steer_coulomb: Scalar
+    scrub: Scalar  # [N m s/rad] of the contact patch against η̇
+    roll_max_torque: Scalar  # [N m] of the motor that `gear` couples first to rolling
+    roll_max_speed: Scalar  # [rad/s]
+    steer_max_torque: Scalar
+    steer_max_speed: Scalar
+    gear_rr: Scalar  # motor speeds = gear · (θ̇, δ̇)
+    gear_rs: Scalar
+    gear_sr: Scalar
+    gear_ss: Scalar
+    roll_active: Scalar  # 1 if driven, else 0
+    steer_active: Scalar
+    off_axis: Scalar  # 1; 0 leaves (D1) out, as chung2008 prints the model
+
+
+class RobotParameters(NamedTuple):
+    """A robot of any number of casters."""
+
+    platform: PlatformParameters
+    casters: tuple[CasterParameters, ...]
+
+
+PLATFORM_FIELDS = len(PlatformParameters._fields)
+CASTER_FIELDS = len(CasterParameters._fields)
+
+
+def robot_parameters(robot: Robot, dynamics: Dynamics = "exact") -> RobotParameters:
+    """The numbers of a robot; "chung2008" leaves the term (D1) out, as that paper prints the model."""
+    if dynamics not in ("exact", "chung2008"):
+        raise ValueError(f'dynamics must be "exact" or "chung2008", got {dynamics!r}')
+    p = robot.platform
+    platform = PlatformParameters(p.mass, p.inertia, p.com[0], p.com[1], robot.floor_friction)
+    casters = tuple(
+        caster_parameters(caster, f"roll_{i}" in robot.driven, f"steer_{i}" in robot.driven, dynamics)
+        for i, caster in enumerate(robot.casters, start=1)
+    )
+    return RobotParameters(platform, casters)
+
+
+def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamics = "exact") -> CasterParameters:
+    """The numbers of one caster whose rolling and steering joints are driven or not."""
+    wheel, link, (gear_roll, gear_steer) = caster.wheel, caster.link, caster.gear
+    return CasterParameters(
+        x=caster.x,
+        y=caster.y,
+        trail=caster.trail,
+        offset=caster.offset,
+        radius=caster.radius,
+        wheel_mass=wheel.mass,
+        spin_inertia=wheel.spin_inertia,
+        yaw_inertia=wheel.yaw_inertia,
+        link_mass=link.mass,
+        link_inertia=link.inertia,
+        link_behind=link.com[0],
+        link_left=link.com[1],
+        roll_armature=caster.roll.armature,
+        steer_armature=caster.steer.armature,
+        roll_viscous=caster.roll.viscous,
+        roll_coulomb=caster.roll.coulomb,
+        steer_viscous=caster.steer.viscous,
+        steer_coulomb=caster.steer.coulomb,
+        scrub=caster.scrub,
+        roll_max_torque=caster.roll.max_torque,
+        roll_max_speed=caster.roll.max_speed,
+        steer_max_torque=caster.steer.max_torque,
+        steer_max_speed=caster.steer.max_speed,
+        gear_rr=gear_roll[0],
+        gear_rs=gear_roll[1],
+        gear_sr=gear_steer[0],
+        gear_ss=gear_steer[1],
+        roll_active=float(roll),
+        steer_active=float(steer),
+        off_axis=1.0 if dynamics == "exact" else 0.0,
+    )
+
+
+def pack_parameters(robot: RobotParameters) -> tuple[Scalar, ...]:
+    """All numbers in one row: the platform's, then each caster's, in the order of their fields."""
+    flat = tuple(robot.platform)
+    for caster in robot.casters:
+        flat = flat + tuple(caster)
+    return flat

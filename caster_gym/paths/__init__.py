@@ -1,0 +1,1 @@
+"""Where to go: timed trajectories of the platform."""

@@ -1,0 +1,195 @@
+"""A robot on powered casters: what it is made of, checked, with units. SI throughout; B is the body frame."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
+
+from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+
+
+
+class Motor(Frozen):
+    """The motor of one joint, seen at that joint."""
+
+    max_torque: PositiveFloat  # [N m]
+    max_speed: PositiveFloat  # [rad/s] at which no torque is left
+    armature: NonNegativeFloat = 0.0  # [kg m²] inertia of rotor and gears, referred to the joint
+    viscous: NonNegativeFloat = 0.0  # [N m s/rad]
+    coulomb: NonNegativeFloat = 0.0  # [N m]
+
+
+class Wheel(Frozen):
+    """A wheel; its mass centre is its centre."""
+
+    mass: NonNegativeFloat  # [kg]
+    spin_inertia: NonNegativeFloat  # [kg m²] about the axle
+    yaw_inertia: NonNegativeFloat  # [kg m²] about a diameter
+
+
+class Link(Frozen):
+    """The steering link, from its axis to the axle."""
+
+    mass: NonNegativeFloat  # [kg]
+    inertia: NonNegativeFloat  # [kg m²] about a vertical axis through its mass centre
+    com: tuple[float, float] = (0.0, 0.0)  # [m] (l, q): behind and left of the steering axis
+
+
+class Caster(Frozen):
+    """One powered caster, described in the body frame."""
+
+    x: float  # [m] pivot, forward of C
+    y: float  # [m] pivot, left of C
+    trail: PositiveFloat  # [m] steering axis to wheel centre, opposite to the rolling direction
+    offset: float = 0.0  # [m] wheel centre left of the steering axis
+    radius: PositiveFloat  # [m]
+    wheel: Wheel
+    link: Link
+    roll: Motor
+    steer: Motor
+    scrub: NonNegativeFloat = 0.0  # [N m s/rad] of the contact patch against yaw over ground
+    gear: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))  # motor speeds = gear · joint rates
+
+    @field_validator("gear")
+    @classmethod
+    def _gear_is_invertible(cls, gear: tuple[tuple[float, float], tuple[float, float]]) -> Any:
+        (a, b), (c, d) = gear
+        if abs(a * d - b * c) < 1e-9 * max(abs(a * d), abs(b * c), 1e-9):
+            raise ValueError("must be invertible: two motors that turn together cannot drive two joints")
+        return gear
+
+
+class Footprint(Frozen):
+    """Outline of the platform in B: a disc of a radius around C, or a convex polygon."""
+
+    disc: PositiveFloat | None = None  # [m]
+    polygon: Annotated[tuple[tuple[float, float], ...], Field(min_length=3)] | None = None  # [m] counter-clockwise
+
+    @model_validator(mode="after")
+    def _one_shape_and_convex(self) -> Self:
+        if (self.disc is None) == (self.polygon is None):
+            raise ValueError("give exactly one of 'disc' (a radius) and 'polygon' (its corners)")
+        if self.polygon is not None:
+            corners = np.asarray(self.polygon)
+            edges = np.roll(corners, -1, axis=0) - corners
+            turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
+            turning = np.arctan2(turns, (edges * np.roll(edges, -1, axis=0)).sum(axis=1)).sum()
+            if not (turns > 0.0).all() or abs(turning - 2.0 * np.pi) > 1e-6:
+                raise ValueError("must be a convex polygon with its corners listed counter-clockwise")
+        return self
+
+
+class Platform(Frozen):
+    """The platform without its casters."""
+
+    mass: PositiveFloat  # [kg]
+    inertia: PositiveFloat  # [kg m²] about a vertical axis through its mass centre
+    com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
+    footprint: Footprint
+
+
+class Robot(Frozen):
+    """An omnidirectional robot on two or more powered casters."""
+
+    name: str
+    platform: Platform
+    casters: Annotated[tuple[Caster, ...], Field(min_length=2)]
+    actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
+    floor_friction: PositiveFloat = 0.7  # [-] between wheels and floor; tells how much of it is used
+
+    @model_validator(mode="after")
+    def _joints_exist(self) -> Self:
+        if self.actuation != "all":
+            check_joints(self.actuation, len(self.casters))
+        places = {(caster.x, caster.y) for caster in self.casters}
+        if len(places) < 2:
+            raise ValueError("at least two casters must stand at different places")
+        return self
+
+    @property
+    def caster_count(self) -> int:
+        """Number N of casters."""
+        return len(self.casters)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all 2 N joints: roll_1, steer_1, roll_2, steer_2, …"""
+        return joint_names(self.caster_count)
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Names of the driven joints, in the order of `joints`."""
+        return self.joints if self.actuation == "all" else tuple(j for j in self.joints if j in self.actuation)
+
+    @property
+    def top_speed(self) -> float:
+        """Speed of the fastest wheel at its motor's top speed. [m/s]"""
+        return max(caster.radius * caster.roll.max_speed for caster in self.casters)
+
+    def with_actuation(self, actuation: str | tuple[str, ...] | list[str]) -> "Robot":
+        """The same robot with other joints driven: "all" or their names."""
+        chosen = actuation if isinstance(actuation, str) else tuple(actuation)
+        return parse(Robot, {**self.model_dump(), "actuation": chosen}, f"actuation of robot {self.name!r}")
+
+    def without_wheels(self) -> "Robot":
+        """The same robot with massless wheels, links and rotors: the "incomplete model" of chung2008."""
+        nothing = {"mass": 0.0, "spin_inertia": 0.0, "yaw_inertia": 0.0}
+        casters = [
+            caster.model_copy(
+                update={
+                    "wheel": Wheel(**nothing),
+                    "link": Link(mass=0.0, inertia=0.0),
+                    "roll": caster.roll.model_copy(update={"armature": 0.0}),
+                    "steer": caster.steer.model_copy(update={"armature": 0.0}),
+                }
+            )
+            for caster in self.casters
+        ]
+        return self.model_copy(update={"casters": tuple(casters)})
+
+    def check_time_step(self, time_step: float) -> None:
+        """Refuse a time step [s] that cannot follow a caster: steering relaxes at the rate speed/trail.
+
+        The step may be as long as trail/speed: RK4 is stable up to 2.8 times that.
+        """
+        longest = min(caster.trail for caster in self.casters) / self.top_speed
+        if not 0.0 < time_step <= longest * (1.0 + 1e-9):
+            raise ValueError(
+                f"a time step of {time_step:g} s cannot follow the casters of robot {self.name!r}: with a trail of "
+                f"{min(caster.trail for caster in self.casters):g} m and a top speed of {self.top_speed:g} m/s it must "
+                f"be positive and at most {longest:.3g} s"
+            )
+
+
+def joint_names(caster_count: int) -> tuple[str, ...]:
+    """roll_1, steer_1, roll_2, steer_2, …"""
+    return tuple(f"{kind}_{i}" for i in range(1, caster_count + 1) for kind in ("roll", "steer"))
+
+
+def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tuple[str, ...]:
+    """The named joints, each known and named once."""
+    known = joint_names(caster_count)
+    unknown = [joint for joint in joints if joint not in known]
+    if unknown:
+        raise ValueError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
+    if len(set(joints)) != len(joints):
+        raise ValueError(f"a joint is named twice in {list(joints)}")
+    if not joints:
+        raise ValueError("at least one joint must be named")
+    return tuple(joints)
+
+
+def load_robot(name: str | Path | Robot) -> Robot:
+    """A robot that comes with the package, by its name, or one from a YAML file of your own."""
+    if isinstance(name, Robot):
+        return name
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        folder = Path(str(files("caster_gym.configs"))) / "robots"
+        path = folder / f"{name}.yaml"
+        if not path.is_file():
+            known = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
+            raise ConfigurationError(f"unknown robot {str(name)!r}; known are {known}, or give the path of a YAML file")
+    return parse(Robot, read_yaml(path), str(path))
