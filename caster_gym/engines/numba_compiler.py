@@ -1,0 +1,152 @@
+"""Teaches Numba the generic mechanics, and keeps what it compiles on disk.
+
+The number of casters is the length of a tuple, hence part of a type: loops over casters unroll while compiling, every
+intermediate value is a register, and a loop over the robots of a block becomes SIMD instructions. Arithmetic stays
+strict IEEE, so that one robot alone and the same robot in a batch agree to the last bit.
+"""
+
+import hashlib
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import numba
+from numba.core import config
+from numba.extending import overload, register_jitable
+
+import caster_gym
+from caster_gym.mechanics import (
+    actuation,
+    caster,
+    dynamics,
+    ground,
+    impulse,
+    integration,
+    linear,
+    motors,
+    plant,
+    scalars,
+)
+
+INLINE = {"forceinline": True}
+_LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
+_LOOPS_AND_CHOICES |= {scalars.flatten, scalars.register}
+
+
+def teach(module: ModuleType) -> None:
+    """Let compiled code call every function that a module defines, inlined."""
+    for function in vars(module).values():
+        own = isinstance(function, FunctionType) and function.__module__ == module.__name__
+        if own and function not in _LOOPS_AND_CHOICES:
+            register_jitable(**INLINE)(function)
+
+
+def compiled(function: Callable[..., Any], parallel: bool = False) -> Any:
+    """The function compiled at its first call, or read from the cache of an earlier process."""
+    with _cache_folder():
+        return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=parallel)(function)
+
+
+@contextmanager
+def _cache_folder() -> Iterator[None]:
+    """Numba's cache in a folder of its own for each version of our sources: Numba itself watches one file only."""
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_root(previous) / _source_digest())
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = previous
+
+
+def _cache_root(chosen: str) -> Path:
+    """NUMBA_CACHE_DIR if set, else the user's cache folder, else a temporary one."""
+    if chosen:
+        return Path(chosen)
+    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "caster_gym"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.gettempdir()) / "caster_gym"
+    return folder if os.access(folder, os.W_OK) else Path(tempfile.gettempdir()) / "caster_gym"
+
+
+def _source_digest() -> str:
+    """Short hash of every source file whose code may be compiled."""
+    digest = hashlib.sha256()
+    package = Path(caster_gym.__file__).parent
+    for folder in ("mechanics", "engines", "envs"):
+        for file in sorted((package / folder).glob("*.py")):
+            digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@overload(scalars.where, jit_options=INLINE, strict=False)
+def _where(condition: Any, yes: Any, no: Any) -> Any:
+    return lambda condition, yes, no: yes if condition else no
+
+
+@overload(scalars.sqrt, jit_options=INLINE, strict=False)
+def _sqrt(x: Any) -> Any:
+    return lambda x: math.sqrt(x)
+
+
+@overload(scalars.add, jit_options=INLINE, strict=False)
+def _add(a: Any, b: Any) -> Any:
+    if len(a) == 1:
+        return lambda a, b: (a[0] + b[0],)
+    return lambda a, b: (a[0] + b[0], *scalars.add(a[1:], b[1:]))
+
+
+@overload(scalars.total, jit_options=INLINE, strict=False)
+def _total(terms: Any) -> Any:
+    if len(terms) == 1:
+        return lambda terms: terms[0]
+    return lambda terms: scalars.add(scalars.total(terms[:-1]), terms[-1])
+
+
+@overload(scalars.pairs, jit_options=INLINE, strict=False)
+def _pairs(flat: Any) -> Any:
+    if len(flat) == 2:
+        return lambda flat: ((flat[0], flat[1]),)
+    return lambda flat: ((flat[0], flat[1]), *scalars.pairs(flat[2:]))
+
+
+@overload(scalars.flatten, jit_options=INLINE, strict=False)
+def _flatten(nested: Any) -> Any:
+    if len(nested) == 1:
+        return lambda nested: nested[0]
+    return lambda nested: nested[0] + scalars.flatten(nested[1:])
+
+
+@overload(scalars.each, jit_options=INLINE, strict=False)
+def _each(function: Any, shared: Any, *columns: Any) -> Any:
+    last = len(columns[0]) == 1
+    if len(columns) == 1:
+        if last:
+            return lambda function, shared, *columns: (function(*shared, columns[0][0]),)
+        return lambda function, shared, *columns: (
+            function(*shared, columns[0][0]),
+            *scalars.each(function, shared, columns[0][1:]),
+        )
+    if len(columns) == 2:
+        if last:
+            return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0]),)
+        return lambda function, shared, *columns: (
+            function(*shared, columns[0][0], columns[1][0]),
+            *scalars.each(function, shared, columns[0][1:], columns[1][1:]),
+        )
+    if last:
+        return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0], columns[2][0]),)
+    return lambda function, shared, *columns: (
+        function(*shared, columns[0][0], columns[1][0], columns[2][0]),
+        *scalars.each(function, shared, columns[0][1:], columns[1][1:], columns[2][1:]),
+    )
+
+
+for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
+    teach(_module)

@@ -1,0 +1,123 @@
+"""The bare mechanics of many robots at once, compiled."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numba
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import ArrayLike, NDArray
+
+from caster_gym.engines.lanes import (
+    BODY_ROWS,
+    LANES,
+    block_count,
+    from_lanes,
+    read_pairs,
+    read_robot,
+    read_state,
+    to_lanes,
+    write,
+)
+from caster_gym.engines.numba_compiler import INLINE, compiled
+from caster_gym.mechanics.integration import pack_state, rk4_step
+from caster_gym.mechanics.parameters import Dynamics, pack_parameters, robot_parameters
+from caster_gym.robot import Robot
+
+PARALLEL_FROM = 8  # blocks, below which waking a second thread costs more than it brings
+
+
+@register_jitable(**INLINE)
+def _step_lanes(block: Any, lanes: int, steps: int, h: float, casters: tuple[int, ...]) -> None:
+    """RK4 steps of the first robots of one block, whose rows are state, joint torques and parameters."""
+    torque_row = BODY_ROWS + 2 * len(casters)
+    parameter_row = torque_row + 2 * len(casters)
+    for _ in range(steps):
+        for lane in range(lanes):
+            state = read_state(block, lane, 0, casters)
+            torques = read_pairs(block, lane, torque_row, casters)
+            robot = read_robot(block, lane, parameter_row, casters)
+            write(block, lane, 0, pack_state(rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)))
+
+
+def _step_block(block: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
+    _step_lanes(block, LANES, steps, h, casters)
+
+
+def _step_one(blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
+    _step_lanes(blocks[0], 1, steps, h, casters)
+
+
+def _step_fleet(blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
+    for i in numba.prange(len(blocks)):
+        _compiled_step_block(blocks[i], steps, h, casters)
+
+
+_compiled_step_block = compiled(_step_block)
+_compiled_step_one = compiled(_step_one)
+_step_serial = compiled(_step_fleet)
+_step_parallel = compiled(_step_fleet, parallel=True)
+
+
+class Fleet:
+    """Robots with the same number of casters, each with its own parameters and state, moved together.
+
+    robots: one Robot for all, or one for each. state (count, 7 + 2 N): x, y [m], cos β, sin β in the world,
+    twist vx, vy, ω in B [m/s, rad/s], then cos δ, sin δ of each caster.
+    """
+
+    def __init__(self, robots: Robot | Sequence[Robot], count: int | None = None, dynamics: Dynamics = "exact") -> None:
+        listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
+        if not listed or (count is not None and len(listed) != count):
+            raise ValueError(f"a fleet needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
+        sizes = {robot.caster_count for robot in listed}
+        if len(sizes) > 1:
+            raise ValueError(f"all robots of a fleet must have the same number of casters, got {sorted(sizes)}")
+        self.robots = tuple(listed)
+        self.count = len(listed)
+        self._casters = tuple(range(sizes.pop()))
+        n = len(self._casters)
+        self._torque_row = BODY_ROWS + 2 * n
+        self._distinct = list({id(robot): robot for robot in listed}.values())
+        packed = {id(robot): pack_parameters(robot_parameters(robot, dynamics)) for robot in self._distinct}
+        parameters = np.array([packed[id(robot)] for robot in listed])
+        rows = self._torque_row + 2 * n + parameters.shape[1]
+        self._blocks: NDArray[np.float64] = np.zeros((block_count(self.count), rows * LANES))
+        to_lanes(parameters, self._blocks, self._torque_row + 2 * n)
+        at_rest = np.zeros((self.count, self._torque_row))
+        at_rest[:, 2] = 1.0
+        at_rest[:, BODY_ROWS::2] = 1.0
+        self.state = at_rest
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """A copy of all states (count, 7 + 2 N)."""
+        return from_lanes(self._blocks, 0, self._torque_row, self.count)
+
+    @state.setter
+    def state(self, value: ArrayLike) -> None:
+        state = self._checked("state", value, self._torque_row)
+        pairs = state[:, [2, 3, *range(BODY_ROWS, self._torque_row)]].reshape(self.count, -1, 2)
+        length = np.hypot(pairs[..., 0], pairs[..., 1])
+        if np.abs(length - 1.0).max() > 1e-6:
+            raise ValueError(f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}")
+        to_lanes(state, self._blocks, 0)
+
+    def step(self, torque: ArrayLike, dt: float, steps: int = 1) -> None:
+        """RK4 steps of dt seconds under joint torques (count, 2 N) [N m]: roll_1, steer_1, roll_2, …"""
+        for robot in self._distinct:
+            robot.check_time_step(dt)
+        to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)
+        if self.count == 1:
+            step = _compiled_step_one
+        else:
+            step = _step_parallel if len(self._blocks) >= PARALLEL_FROM else _step_serial
+        step(self._blocks, steps, dt, self._casters)
+
+    def _checked(self, name: str, value: ArrayLike, width: int) -> NDArray[np.float64]:
+        array = np.asarray(value, dtype=np.float64)
+        if array.shape != (self.count, width):
+            raise ValueError(f"{name} must have shape {(self.count, width)}, got {array.shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+        return array
