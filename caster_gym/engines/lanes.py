@@ -89,10 +89,8 @@ def counting(like: tuple[Any, ...]) -> tuple[int, ...]:
 
 @overload(counting, jit_options=INLINE, strict=False)
 def _counting(like: Any) -> Any:
-    last = len(like) - 1
-    if last == 0:
-        return lambda like: (0,)
-    return lambda like: (*counting(like[:-1]), last)
+    numbers = tuple(range(len(like)))
+    return lambda like: numbers
 
 
 @register_jitable(**INLINE)

@@ -35,7 +35,7 @@ from caster_gym.mechanics import (
 
 INLINE = {"forceinline": True}
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
-_LOOPS_AND_CHOICES |= {scalars.flatten, scalars.register}
+_LOOPS_AND_CHOICES |= {scalars.flatten, scalars.greatest, scalars.register}
 
 
 def teach(module: ModuleType) -> None:
@@ -99,7 +99,8 @@ def _sqrt(x: Any) -> Any:
 def _add(a: Any, b: Any) -> Any:
     if len(a) == 1:
         return lambda a, b: (a[0] + b[0],)
-    return lambda a, b: (a[0] + b[0], *scalars.add(a[1:], b[1:]))
+    half = len(a) // 2
+    return lambda a, b: scalars.add(a[:half], b[:half]) + scalars.add(a[half:], b[half:])
 
 
 @overload(scalars.total, jit_options=INLINE, strict=False)
@@ -109,42 +110,55 @@ def _total(terms: Any) -> Any:
     return lambda terms: scalars.add(scalars.total(terms[:-1]), terms[-1])
 
 
+@overload(scalars.greatest, jit_options=INLINE, strict=False)
+def _greatest(values: Any) -> Any:
+    if len(values) == 1:
+        return lambda values: values[0]
+    return lambda values: scalars.maximum(values[-1], scalars.greatest(values[:-1]))
+
+
 @overload(scalars.pairs, jit_options=INLINE, strict=False)
 def _pairs(flat: Any) -> Any:
     if len(flat) == 2:
         return lambda flat: ((flat[0], flat[1]),)
-    return lambda flat: ((flat[0], flat[1]), *scalars.pairs(flat[2:]))
+    half = len(flat) // 4 * 2
+    return lambda flat: scalars.pairs(flat[:half]) + scalars.pairs(flat[half:])
 
 
 @overload(scalars.flatten, jit_options=INLINE, strict=False)
 def _flatten(nested: Any) -> Any:
+    if len(nested) == 0:
+        return lambda nested: ()
     if len(nested) == 1:
         return lambda nested: nested[0]
-    return lambda nested: nested[0] + scalars.flatten(nested[1:])
+    half = len(nested) // 2
+    return lambda nested: scalars.flatten(nested[:half]) + scalars.flatten(nested[half:])
 
 
 @overload(scalars.each, jit_options=INLINE, strict=False)
 def _each(function: Any, shared: Any, *columns: Any) -> Any:
-    last = len(columns[0]) == 1
+    count = len(columns[0])
+    half = count // 2
+    if count == 0:
+        return lambda function, shared, *columns: ()
     if len(columns) == 1:
-        if last:
+        if count == 1:
             return lambda function, shared, *columns: (function(*shared, columns[0][0]),)
         return lambda function, shared, *columns: (
-            function(*shared, columns[0][0]),
-            *scalars.each(function, shared, columns[0][1:]),
+            scalars.each(function, shared, columns[0][:half]) + scalars.each(function, shared, columns[0][half:])
         )
     if len(columns) == 2:
-        if last:
+        if count == 1:
             return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0]),)
         return lambda function, shared, *columns: (
-            function(*shared, columns[0][0], columns[1][0]),
-            *scalars.each(function, shared, columns[0][1:], columns[1][1:]),
+            scalars.each(function, shared, columns[0][:half], columns[1][:half])
+            + scalars.each(function, shared, columns[0][half:], columns[1][half:])
         )
-    if last:
+    if count == 1:
         return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0], columns[2][0]),)
     return lambda function, shared, *columns: (
-        function(*shared, columns[0][0], columns[1][0], columns[2][0]),
-        *scalars.each(function, shared, columns[0][1:], columns[1][1:], columns[2][1:]),
+        scalars.each(function, shared, columns[0][:half], columns[1][:half], columns[2][:half])
+        + scalars.each(function, shared, columns[0][half:], columns[1][half:], columns[2][half:])
     )
 
 

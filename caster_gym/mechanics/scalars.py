@@ -78,6 +78,14 @@ def total(terms: tuple[tuple[Any, ...], ...]) -> tuple[Any, ...]:
     return result
 
 
+def greatest(values: tuple[Any, ...]) -> Any:
+    """The greatest of some values."""
+    result = values[0]
+    for value in values[1:]:
+        result = maximum(value, result)
+    return result
+
+
 def pairs(flat: tuple[Any, ...]) -> tuple[tuple[Any, Any], ...]:
     """(a, b, c, d, …) -> ((a, b), (c, d), …)."""
     return tuple(zip(flat[::2], flat[1::2], strict=True))

@@ -1,0 +1,303 @@
+"""The task of following a timed trajectory, on generic scalars: errors, observation, reward terms and endings.
+
+Like the mechanics, this is written once: the single environment and the batch compile the same lines. Quantities with
+suffix _W are in the world frame, all others in the body frame B. Rational kernels 1 / (1 + e²/ℓ²) keep rewards bounded
+and free of roots and exponentials.
+"""
+
+from typing import NamedTuple, TypeAlias
+
+from caster_gym.mechanics.actuation import conditioning
+from caster_gym.mechanics.caster import joint_rates
+from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.ground import ground_force, traction_use, wheel_loads
+from caster_gym.mechanics.integration import State, pack_state
+from caster_gym.mechanics.motors import joint_torques
+from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
+from caster_gym.mechanics.scalars import Direction, Scalar, Vector, clip, each, flatten, greatest, maximum, sqrt, total, where
+
+POSITION_UNIT = 0.1  # [m] an observed position error of 1
+PREVIEW_UNIT = 0.5  # [m] an observed distance to a previewed point of 1
+SPEED_UNIT = 1.0  # [m/s] also of a wheel's rim and of a pivot around its wheel
+SPEED_ERROR_UNIT = 0.25  # [m/s]
+YAW_RATE_UNIT = 2.0  # [rad/s]
+YAW_RATE_ERROR_UNIT = 0.5  # [rad/s]
+ACCELERATION_UNIT = 2.0  # [m/s²]
+YAW_ACCELERATION_UNIT = 4.0  # [rad/s²]
+OBSERVATION_LIMIT = 20.0  # observed quantities are clipped here, far beyond what a robot in its corridor reaches
+
+Point: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+
+
+class Reference(NamedTuple):
+    """What the trajectory asks at one time, in the world frame; one row of a `caster_gym.paths.Trajectory`."""
+
+    x: Scalar  # [m]
+    y: Scalar
+    cos: Scalar  # heading
+    sin: Scalar
+    vx: Scalar  # [m/s]
+    vy: Scalar
+    omega: Scalar  # [rad/s]
+    ax: Scalar  # [m/s²]
+    ay: Scalar
+    alpha: Scalar  # [rad/s²]
+
+
+class Errors(NamedTuple):
+    """Reference minus robot, in the body frame."""
+
+    ahead: Scalar  # [m]
+    left: Scalar  # [m]
+    cos: Scalar  # of the heading error
+    sin: Scalar
+    vx: Scalar  # [m/s]
+    vy: Scalar
+    omega: Scalar  # [rad/s]
+
+
+class Weights(NamedTuple):
+    """What tracking is worth, and when it has failed."""
+
+    position: Scalar  # [1] reward for being at the reference
+    heading: Scalar
+    speed: Scalar
+    effort: Scalar
+    position_scale: Scalar  # ℓ [m] the error at which half of the fine kernel is left
+    heading_scale: Scalar  # [rad]
+    speed_scale: Scalar  # [m/s]
+    yaw_rate_scale: Scalar  # [rad/s]
+    coarse: Scalar  # ratio of the wide kernel's length to the fine one's
+    corridor: Scalar  # [m] position error that ends the episode
+
+
+class Terms(NamedTuple):
+    """Reward terms; the reward is their sum."""
+
+    position: Scalar
+    heading: Scalar
+    speed: Scalar
+    effort: Scalar
+    alive: Scalar
+
+
+def to_body(heading: Direction, x_W: Scalar, y_W: Scalar) -> tuple[Scalar, Scalar]:
+    """Components in B of a vector in W."""
+    c, s = heading
+    return c * x_W + s * y_W, c * y_W - s * x_W
+
+
+def tracking_errors(state: State, reference: Reference) -> Errors:
+    """Where and how fast the reference is, seen from the robot."""
+    c, s = state.heading
+    ahead, left = to_body(state.heading, reference.x - state.position[0], reference.y - state.position[1])
+    vx, vy = to_body(state.heading, reference.vx, reference.vy)
+    return Errors(
+        ahead,
+        left,
+        c * reference.cos + s * reference.sin,
+        c * reference.sin - s * reference.cos,
+        vx - state.twist[0],
+        vy - state.twist[1],
+        reference.omega - state.twist[2],
+    )
+
+
+def kernel(square: Scalar, scale: Scalar) -> Scalar:
+    """1 / (1 + e²/ℓ²) of a squared error."""
+    return 1.0 / (1.0 + square / (scale * scale))
+
+
+def reward_terms(errors: Errors, effort: Scalar, failed: Scalar, weights: Weights) -> Terms:
+    """Bounded tracking quality minus effort, never negative in sum, so that staying in the task beats leaving it.
+
+    Each quality is the mean of a fine kernel, for precision, and a coarse one, for a slope far away. The term `alive`
+    equals the greatest effort. effort is the mean square of the torques as shares of their limits, in 0 … 1.
+    """
+    distance = errors.ahead * errors.ahead + errors.left * errors.left
+    turn = 2.0 * (1.0 - errors.cos)  # squared chord of the heading error
+    rate = (errors.vx * errors.vx + errors.vy * errors.vy) / (weights.speed_scale * weights.speed_scale)
+    rate = rate + errors.omega * errors.omega / (weights.yaw_rate_scale * weights.yaw_rate_scale)
+    wide = weights.coarse
+    alive = where(failed > 0.5, 0.0, 1.0)
+    position = 0.5 * (kernel(distance, weights.position_scale) + kernel(distance, wide * weights.position_scale))
+    heading = 0.5 * (kernel(turn, weights.heading_scale) + kernel(turn, wide * weights.heading_scale))
+    speed = 0.5 * (kernel(rate, 1.0) + kernel(rate, wide))
+    return Terms(
+        where(failed > 0.5, 0.0, weights.position * position),
+        where(failed > 0.5, 0.0, weights.heading * heading),
+        where(failed > 0.5, 0.0, weights.speed * speed),
+        where(failed > 0.5, 0.0, -weights.effort * effort),
+        weights.effort * alive,
+    )
+
+
+def not_finite(state: State) -> Scalar:
+    """1 if any number of the state is infinite or no number, else 0."""
+    (doubt,) = total(each(difference, (), pack_state(state)))
+    return where(doubt == 0.0, 0.0, 1.0)
+
+
+def difference(number: Scalar) -> tuple[Scalar]:
+    """0 for a finite number, else not a number."""
+    return (number - number,)
+
+
+def left_corridor(errors: Errors, weights: Weights) -> Scalar:
+    """1 if the position error exceeds the corridor, else 0."""
+    distance = errors.ahead * errors.ahead + errors.left * errors.left
+    return where(distance > weights.corridor * weights.corridor, 1.0, 0.0)
+
+
+def relative_effort(torque: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    """Sum of squared torques as shares of their limits, and number of driven motors, of one caster."""
+    roll, steer = torque[0] / caster.roll_max_torque, torque[1] / caster.steer_max_torque
+    return roll * roll + steer * steer, caster.roll_active + caster.steer_active
+
+
+def mean_effort(torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
+    """Mean square of the motor torques as shares of their limits, 0 … 1."""
+    squares, driven = total(each(relative_effort, (), torques, robot.casters))
+    return squares / driven
+
+
+def observed(number: Scalar) -> Scalar:
+    """A number within the observation space; one that is not a number becomes its lower end."""
+    return clip(number, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+
+
+def preview_point(state: State, point: Point) -> Point:
+    """A coming point of the trajectory seen from the robot: place, heading, velocity and yaw rate."""
+    x, y, cos, sin, vx, vy, omega = point
+    c, s = state.heading
+    ahead, left = to_body(state.heading, x - state.position[0], y - state.position[1])
+    forward, leftward = to_body(state.heading, vx, vy)
+    return (
+        ahead / PREVIEW_UNIT,
+        left / PREVIEW_UNIT,
+        c * cos + s * sin,
+        c * sin - s * cos,
+        forward / SPEED_UNIT,
+        leftward / SPEED_UNIT,
+        omega / YAW_RATE_UNIT,
+    )
+
+
+def caster_rates(v: Vector, f: Direction, caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    """Rolling and steering rate of one caster as speeds of the rim and of the pivot around the wheel."""
+    theta, delta = joint_rates(v, f, caster)
+    return theta * caster.radius / SPEED_UNIT, delta * caster.trail / SPEED_UNIT
+
+
+def observe(
+    state: State, reference: Reference, errors: Errors, preview: tuple[Point, ...], robot: RobotParameters
+) -> tuple[Scalar, ...]:
+    """The observation; `caster_gym.envs.observation` names its parts."""
+    vx, vy, omega = state.twist
+    ax, ay = to_body(state.heading, reference.ax, reference.ay)
+    numbers = (
+        errors.ahead / POSITION_UNIT,
+        errors.left / POSITION_UNIT,
+        errors.cos,
+        errors.sin,
+        errors.vx / SPEED_ERROR_UNIT,
+        errors.vy / SPEED_ERROR_UNIT,
+        errors.omega / YAW_RATE_ERROR_UNIT,
+        vx / SPEED_UNIT,
+        vy / SPEED_UNIT,
+        omega / YAW_RATE_UNIT,
+        ax / ACCELERATION_UNIT,
+        ay / ACCELERATION_UNIT,
+        reference.alpha / YAW_ACCELERATION_UNIT,
+    )
+    casters = flatten(state.directions) + flatten(
+        each(caster_rates, (state.twist,), state.directions, robot.casters)
+    )
+    ahead = flatten(each(preview_point, (state,), preview))
+    return each(observed, (), numbers + casters + ahead)
+
+
+def greatest_traction(
+    state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters
+) -> Scalar:
+    """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it would slip."""
+    at_joints = each(joint_torques, (), torques, robot.casters)
+    v_rate = forward_dynamics(state.twist, state.directions, at_joints, (0.0, 0.0, 0.0), robot)
+    forces = each(ground_force, (state.twist, v_rate), state.directions, robot.casters, at_joints)
+    return greatest(each(wheel_use, (robot.platform,), forces, wheel_loads(state.directions, robot)))
+
+
+def wheel_use(platform: PlatformParameters, force: tuple[Scalar, Scalar], load: Scalar) -> Scalar:
+    """Share of the floor's friction that one wheel uses."""
+    return traction_use(force, load, platform.floor_friction)
+
+
+class Report(NamedTuple):
+    """What a step tells beside observation and reward: fixed quantities first, then the motor torques."""
+
+    left_corridor: Scalar  # 1 or 0
+    not_finite: Scalar  # 1 or 0
+    position_error: Scalar  # [m]
+    heading_sin: Scalar  # of the heading error
+    heading_cos: Scalar
+    power: Scalar  # [W]
+    traction_use: Scalar  # [-]
+    conditioning: Scalar  # [-]
+    terms: Terms
+    pose: tuple[Scalar, Scalar, Scalar, Scalar]  # x, y, cos β, sin β in W
+    reference_pose: tuple[Scalar, Scalar, Scalar, Scalar]
+
+
+def score(
+    state: State,
+    reference: Reference,
+    errors: Errors,
+    torques: tuple[tuple[Scalar, Scalar], ...],
+    power: Scalar,
+    weights: Weights,
+    robot: RobotParameters,
+) -> Report:
+    """Reward terms, endings and diagnostics of the present state after a step with the given mean motor torques."""
+    outside, broken = left_corridor(errors, weights), not_finite(state)
+    return Report(
+        outside,
+        broken,
+        sqrt(errors.ahead * errors.ahead + errors.left * errors.left),
+        errors.sin,
+        errors.cos,
+        power,
+        greatest_traction(state, torques, robot),
+        conditioning(state.directions, robot),
+        reward_terms(errors, mean_effort(torques, robot), maximum(outside, broken), weights),
+        state.position + state.heading,
+        (reference.x, reference.y, reference.cos, reference.sin),
+    )
+
+
+def flat_report(report: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> tuple[Scalar, ...]:
+    """The report and the motor torques as one row."""
+    fixed = (
+        report.left_corridor,
+        report.not_finite,
+        report.position_error,
+        report.heading_sin,
+        report.heading_cos,
+        report.power,
+        report.traction_use,
+        report.conditioning,
+    )
+    terms = report.terms
+    named = (terms.position, terms.heading, terms.speed, terms.effort, terms.alive)
+    return fixed + named + report.pose + report.reference_pose + flatten(torques)
+
+
+def start(reference: Reference, offset: tuple[Scalar, Scalar], turn: Direction, directions: tuple[Direction, ...]) -> State:
+    """A start at rest: beside the trajectory's first point by an offset in its frame, turned from its heading."""
+    c, s = reference.cos, reference.sin
+    x, y = offset
+    return State(
+        (reference.x + c * x - s * y, reference.y + s * x + c * y),
+        (c * turn[0] - s * turn[1], s * turn[0] + c * turn[1]),
+        (0.0 * c, 0.0 * c, 0.0 * c),
+        directions,
+    )
