@@ -1,0 +1,98 @@
+"""Where the body x-axis points along a path: along the tangent, fixed, spinning, or through angles of your own."""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from caster_gym.configuration import Frozen, parse
+from caster_gym.paths.naming import unknown_name
+from caster_gym.paths.trajectory import Array, Plane
+
+Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first three derivatives
+
+
+class Tangent(Frozen):
+    """Along the path."""
+
+    kind: Literal["tangent"] = "tangent"
+    offset: float = 0.0  # [rad] from the tangent to the body x-axis, counter-clockwise
+
+    def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
+        """Angle [rad] and its first two derivatives by the share of the path, 0 … 1, as the slopes are.
+
+        The angle is the imaginary part of ln p′, whose derivative is p″ / p′.
+        """
+        _, first, second, third = slopes
+        with np.errstate(divide="ignore", invalid="ignore"):  # Trajectory refuses what is not finite
+            bend = second / first
+            return np.angle(first) + self.offset, bend.imag, (third / first - bend**2).imag
+
+
+class Fixed(Frozen):
+    """At one angle."""
+
+    kind: Literal["fixed"] = "fixed"
+    angle: float = 0.0  # [rad]
+
+    def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
+        """As for Tangent."""
+        return np.full_like(share, self.angle), np.zeros_like(share), np.zeros_like(share)
+
+
+class Spinning(Frozen):
+    """Turning in proportion to the progress."""
+
+    kind: Literal["spinning"] = "spinning"
+    turns: float = 1.0  # [rev] over the whole path, counter-clockwise
+    angle: float = 0.0  # [rad] at the start
+
+    def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
+        """As for Tangent."""
+        whole = 2.0 * np.pi * self.turns
+        return self.angle + whole * share, np.full_like(share, whole), np.zeros_like(share)
+
+
+class Profile(Frozen):
+    """Through given angles, smoothly."""
+
+    kind: Literal["profile"] = "profile"
+    angles: Annotated[tuple[float, ...], Field(min_length=2)]  # [rad], not wrapped: 6.283 is a turn away from 0
+    progress: tuple[float, ...] | None = None  # [-] share of the path at each angle, 0 … 1; None spaces them evenly
+
+    @model_validator(mode="after")
+    def _progress_ascends(self) -> Self:
+        p = self.progress
+        if p is not None:
+            if len(p) != len(self.angles):
+                raise ValueError(f"needs one progress for each angle, got {len(p)} for {len(self.angles)}")
+            if p[0] != 0.0 or p[-1] != 1.0 or any(b <= a for a, b in pairwise(p)):
+                raise ValueError(f"progress must ascend from 0 to 1, got {list(p)}")
+        return self
+
+    def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
+        """As for Tangent."""
+        from caster_gym.paths.interpolation import open_spline  # SciPy takes a while to import
+
+        at = np.linspace(0.0, 1.0, len(self.angles)) if self.progress is None else np.asarray(self.progress)
+        angle, first, second, _ = open_spline(at, np.asarray(self.angles), share)
+        return angle, first, second
+
+
+_KINDS: dict[str, type[Frozen]] = {"tangent": Tangent, "fixed": Fixed, "spinning": Spinning, "profile": Profile}
+
+
+def _read_heading(value: Any) -> Any:
+    """A heading by the name of its kind, or by a mapping with its kind in it."""
+    content = {"kind": value} if isinstance(value, str) else value
+    if not isinstance(content, Mapping):
+        return value
+    kind = content.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise ValueError(unknown_name("kind", kind, _KINDS))
+    return parse(_KINDS[kind], content, kind)
+
+
+Heading = Annotated[Tangent | Fixed | Spinning | Profile, Field(discriminator="kind"), BeforeValidator(_read_heading)]
