@@ -87,7 +87,9 @@ class CasterVecEnv(VecEnv):
         """Not possible: the robots of a batch have no methods of their own."""
         raise AttributeError(f"robots of a batch are no environments: {method_name!r} cannot be called on them")
 
-    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None) -> list[bool]:
+    def env_is_wrapped(
+        self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
+    ) -> list[bool]:
         """No robot of a batch is wrapped."""
         return [False] * len(list(self._get_indices(indices)))
 

@@ -10,7 +10,6 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, mo
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 
 
-
 class Motor(Frozen):
     """The motor of one joint, seen at that joint."""
 
@@ -50,7 +49,10 @@ class Caster(Frozen):
     roll: Motor
     steer: Motor
     scrub: NonNegativeFloat = 0.0  # [N m s/rad] of the contact patch against yaw over ground
-    gear: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))  # motor speeds = gear · joint rates
+    gear: tuple[tuple[float, float], tuple[float, float]] = (
+        (1.0, 0.0),
+        (0.0, 1.0),
+    )  # motor speeds = gear · joint rates
 
     @field_validator("gear")
     @classmethod

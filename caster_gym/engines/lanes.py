@@ -64,8 +64,8 @@ def _read(block: Any, lane: Any, row: Any, like: Any) -> Any:
     if len(like) == 1:
         return lambda block, lane, row, like: (block[row * LANES + lane],)
     half = len(like) // 2
-    return lambda block, lane, row, like: read(block, lane, row, like[:half]) + read(
-        block, lane, row + half, like[half:]
+    return lambda block, lane, row, like: (
+        read(block, lane, row, like[:half]) + read(block, lane, row + half, like[half:])
     )
 
 

@@ -100,7 +100,9 @@ class Fleet:
         pairs = state[:, [2, 3, *range(BODY_ROWS, self._torque_row)]].reshape(self.count, -1, 2)
         length = np.hypot(pairs[..., 0], pairs[..., 1])
         if np.abs(length - 1.0).max() > 1e-6:
-            raise ValueError(f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}")
+            raise ValueError(
+                f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}"
+            )
         to_lanes(state, self._blocks, 0)
 
     def step(self, torque: ArrayLike, dt: float, steps: int = 1) -> None:

@@ -57,9 +57,7 @@ class Model:
 
     def bias(self, steering: ArrayLike, twist: ArrayLike) -> Array:
         """Coriolis and centrifugal force h (..., 3) at C, in B."""
-        return self._stack(
-            dynamics.bias(self._vector("twist", twist), self._directions(steering), self._parameters)
-        )
+        return self._stack(dynamics.bias(self._vector("twist", twist), self._directions(steering), self._parameters))
 
     def friction(self, steering: ArrayLike, twist: ArrayLike) -> Array:
         """Friction of joints and contact patches (..., 3) at C, in B, as the force that overcomes it."""
@@ -118,8 +116,9 @@ class Model:
         """
         p, n = self._components("point", point, 2), self._components("normal", normal, 2)
         length = n[0] * n[0] + n[1] * n[1]
-        if bool((abs(length - 1.0) > 1e-6).any()):
-            raise ValueError(f"normal must be a unit vector, got a length of {float(length.max()) ** 0.5:g}")
+        wrong = abs(length - 1.0) > 1e-6
+        if bool(wrong.any()):
+            raise ValueError(f"normal must be a unit vector, got a length of {float(length[wrong][0]) ** 0.5:g}")
         e = self._in_range("restitution", restitution, 0.0, 1.0)
         mu = self._in_range("friction", friction, 0.0, float("inf"))
         directions, v = self._directions(steering), self._vector("twist", twist)
@@ -184,7 +183,9 @@ class Model:
     def _in_range(self, name: str, value: Any, low: float, high: float) -> Any:
         number = self._array(name, self._arrays.asarray(value)[..., None], 1)[..., 0]
         if bool(((number < low) | (number > high)).any()):
-            raise ValueError(f"{name} must lie in {low:g} … {high:g}, got {float(number.min()):g} … {float(number.max()):g}")
+            raise ValueError(
+                f"{name} must lie in {low:g} … {high:g}, got {float(number.min()):g} … {float(number.max()):g}"
+            )
         return number
 
     def _follow(self, angle: Any, f: Direction) -> Any:

@@ -74,7 +74,9 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._started = False
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode; info as after a step."""
         super().reset(seed=seed)
         if seed is not None or not self._started:

@@ -121,7 +121,12 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
         if options is None or "reset_mask" not in options:
             return np.ones(self.num_envs, dtype=np.bool_)
         mask = options["reset_mask"]
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
+        if (
+            not isinstance(mask, np.ndarray)
+            or mask.dtype != np.bool_
+            or mask.shape != (self.num_envs,)
+            or not mask.any()
+        ):
             raise ValueError(
                 f"options['reset_mask'] must be a boolean array of shape ({self.num_envs},) with at least one True, "
                 f"got {mask!r}"

@@ -17,7 +17,9 @@ from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot, load_robot
 
 RobotLike: TypeAlias = str | Path | Robot
-PathLike: TypeAlias = str | Mapping[str, Any] | PathSpecification | Sequence[str | Mapping[str, Any] | PathSpecification]
+PathLike: TypeAlias = (
+    str | Mapping[str, Any] | PathSpecification | Sequence[str | Mapping[str, Any] | PathSpecification]
+)
 
 
 def make_engine(

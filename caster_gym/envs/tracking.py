@@ -14,7 +14,19 @@ from caster_gym.mechanics.ground import ground_force, traction_use, wheel_loads
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
-from caster_gym.mechanics.scalars import Direction, Scalar, Vector, clip, each, flatten, greatest, maximum, sqrt, total, where
+from caster_gym.mechanics.scalars import (
+    Direction,
+    Scalar,
+    Vector,
+    clip,
+    each,
+    flatten,
+    greatest,
+    maximum,
+    sqrt,
+    total,
+    where,
+)
 
 POSITION_UNIT = 0.1  # [m] an observed position error of 1
 PREVIEW_UNIT = 0.5  # [m] an observed distance to a previewed point of 1
@@ -210,16 +222,12 @@ def observe(
         ay / ACCELERATION_UNIT,
         reference.alpha / YAW_ACCELERATION_UNIT,
     )
-    casters = flatten(state.directions) + flatten(
-        each(caster_rates, (state.twist,), state.directions, robot.casters)
-    )
+    casters = flatten(state.directions) + flatten(each(caster_rates, (state.twist,), state.directions, robot.casters))
     ahead = flatten(each(preview_point, (state,), preview))
     return each(observed, (), numbers + casters + ahead)
 
 
-def greatest_traction(
-    state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters
-) -> Scalar:
+def greatest_traction(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
     """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it would slip."""
     at_joints = each(joint_torques, (), torques, robot.casters)
     v_rate = forward_dynamics(state.twist, state.directions, at_joints, (0.0, 0.0, 0.0), robot)
@@ -291,7 +299,9 @@ def flat_report(report: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> t
     return fixed + named + report.pose + report.reference_pose + flatten(torques)
 
 
-def start(reference: Reference, offset: tuple[Scalar, Scalar], turn: Direction, directions: tuple[Direction, ...]) -> State:
+def start(
+    reference: Reference, offset: tuple[Scalar, Scalar], turn: Direction, directions: tuple[Direction, ...]
+) -> State:
     """A start at rest: beside the trajectory's first point by an offset in its frame, turned from its heading."""
     c, s = reference.cos, reference.sin
     x, y = offset

@@ -59,4 +59,4 @@ def conditioning(directions: tuple[Direction, ...], robot: RobotParameters) -> S
     """σ_min / σ_max of the driven motors' wrenches, 0 (singular) to 1 (isotropic). (A1)"""
     gram = total(each(caster_gram, (characteristic_length(robot),), directions, robot.casters))
     least, greatest = extreme_eigenvalues(gram)
-    return sqrt(maximum(least, 0.0 * least) / maximum(greatest, 1e-300))
+    return sqrt(maximum(least, 0.0 * greatest) / maximum(greatest, 1e-300))

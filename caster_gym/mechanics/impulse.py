@@ -1,7 +1,7 @@
 """Collision impulses, the wheels' inertia included. Derivation: docs/equations.md, section C.
 
 The wheels keep rolling without slip through the impact, so the full M(δ) answers to the impulse and the robot is
-heavier across its wheels than along them. Friction: Chatterjee and Ruina, J. Applied Mechanics 65 (1998) 939.
+heavier along its wheels than across them. Friction: Chatterjee and Ruina, J. Applied Mechanics 65 (1998) 939.
 """
 
 from caster_gym.mechanics.dynamics import inertia

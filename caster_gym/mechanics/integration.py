@@ -35,7 +35,7 @@ def unpack_state(flat: tuple[Scalar, ...]) -> State:
 def steering_turn(v: Vector, f: Direction, caster: CasterParameters) -> Direction:
     """Rate of change of a caster's rolling direction, in B. [1/s]"""
     _, _, delta = rates(v, f, caster)
-    return -f[1] * delta, f[0] * delta
+    return -f[1] * delta, f[0] * delta  # (I1)
 
 
 def derivative(
@@ -71,7 +71,7 @@ def advance(state: State, h: Scalar, rate: State) -> State:
 def unit(f: Direction) -> Direction:
     """f brought back to length 1 by one Newton step for 1/√(c² + s²), enough since a time step barely leaves it."""
     c, s = f
-    scale = 1.5 - 0.5 * (c * c + s * s)
+    scale = 1.5 - 0.5 * (c * c + s * s)  # (I2)
     return c * scale, s * scale
 
 

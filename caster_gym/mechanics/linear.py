@@ -36,21 +36,22 @@ def multiply(m: Symmetric, v: Vector) -> Vector:
 def extreme_eigenvalues(m: Symmetric) -> tuple[Scalar, Scalar]:
     """Least and greatest eigenvalue of a symmetric matrix, without trigonometry.
 
-    With λ = p/3 + (R/3) z the characteristic polynomial becomes z³ − 3 z = 2 κ, |κ| <= 1. Of its three real roots one
-    lies apart from the others, |z| in [√3, 2]: Newton's steps from 2 find it, and the rest is a quadratic equation.
+    With λ = mean + size · z, √6 size the norm of what the mean leaves, the characteristic polynomial becomes
+    z³ − 3 z = 2 κ, |κ| <= 1. Of its three real roots one lies apart from the others, |z| in [√3, 2]: Newton's steps
+    from 2 find it, and the rest is a quadratic equation.
     """
     xx, xy, xz, yy, yz, zz = m
-    p = xx + yy + zz
-    q = (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz)
-    det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    third = sqrt(maximum(p * p - 3.0 * q, 0.0 * p)) / 3.0
-    cube = third * third * third
-    kappa = clip((p * p * p / 27.0 - q * p / 6.0 + 0.5 * det) / maximum(cube, 1e-300), -1.0, 1.0)
+    mean = (xx + yy + zz) / 3.0
+    a, b, c = xx - mean, yy - mean, zz - mean  # the mean goes first: nothing cancels when the eigenvalues are close
+    squares = 0.5 * (a * a + b * b + c * c) + xy * xy + xz * xz + yz * yz
+    det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
+    size = sqrt(squares / 3.0)
+    kappa = clip(0.5 * det / maximum(size * size * size, 1e-300), -1.0, 1.0)
     apart = where(kappa < 0.0, -kappa, kappa)
-    z = 2.0 + 0.0 * p
+    z = 2.0 + 0.0 * mean
     for _ in range(NEWTON_STEPS):
         z = z - ((z * z - 3.0) * z - 2.0 * apart) / (3.0 * z * z - 3.0)
     w = 0.5 * (z + sqrt(maximum(12.0 - 3.0 * z * z, 0.0 * z)))  # the root farthest from z is −w
     low = where(kappa < 0.0, -z, -w)
     high = where(kappa < 0.0, w, z)
-    return p / 3.0 + third * low, p / 3.0 + third * high
+    return mean + size * low, mean + size * high

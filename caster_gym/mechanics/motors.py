@@ -10,13 +10,13 @@ from caster_gym.mechanics.scalars import Scalar, clip
 
 def motor_speeds(joint_rates: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
     """Speeds of a caster's two motors from its rolling and steering rates. [rad/s]"""
-    theta, delta = joint_rates
+    theta, delta = joint_rates  # (M1)
     return caster.gear_rr * theta + caster.gear_rs * delta, caster.gear_sr * theta + caster.gear_ss * delta
 
 
 def torque_range(speed: Scalar, max_torque: Scalar, max_speed: Scalar) -> tuple[Scalar, Scalar]:
     """Least and greatest torque that a motor gives: falling to zero at its top speed, whole when it brakes. [N m]"""
-    ratio = speed / max_speed
+    ratio = speed / max_speed  # (M3)
     low = -max_torque * clip(1.0 + ratio, 0.0, 1.0)
     high = max_torque * clip(1.0 - ratio, 0.0, 1.0)
     return low, high
@@ -44,5 +44,5 @@ def motor_torques(
 
 def joint_torques(motor: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
     """Torques at a caster's rolling and steering joints from those of its motors. [N m]"""
-    roll, steer = motor
+    roll, steer = motor  # (M2)
     return caster.gear_rr * roll + caster.gear_sr * steer, caster.gear_rs * roll + caster.gear_ss * steer

@@ -1,0 +1,83 @@
+"""The equations against MuJoCo, which knows bodies, joints and friction but nothing of casters."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from caster_gym import Model, Robot, load_robot
+from scripts.mujoco_peer import joint_indices, mjcf, path_length, simulate, without_dry_friction
+from tests.random_robots import random_robot
+
+STEP = 2e-3  # [s] of the equations
+CHUNG = load_robot("chung2008")
+START = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.5, -2.7, -2.7])  # at rest, wheels askew
+TORQUE = np.array([0.031, 0.015, 0.002, -0.011, -0.045, -0.006])  # [N m] up to a quarter of the greatest
+
+
+def solid_wheels(robot: Robot) -> Robot:
+    """The robot with wheels that a solid body can have: no less inertia about a diameter than half of the spin's."""
+    casters = tuple(
+        caster.model_copy(update={"wheel": caster.wheel.model_copy(update={"yaw_inertia": caster.wheel.spin_inertia})})
+        for caster in robot.casters
+    )
+    return robot.model_copy(update={"casters": casters})
+
+
+def ends(robot, state, torque, duration, timesteps):
+    """Poses where the equations and MuJoCo, once for each of its time steps, end."""
+    exact = Model(robot).simulate(state, torque, STEP, round(duration / STEP))[-1, :3]
+    return exact, [simulate(robot, state, torque, timestep, duration).pose[-1] for timestep in timesteps]
+
+
+def assert_limit_is_exact(robot, state, torque, duration):
+    """MuJoCo's error is of first order: extrapolated to a step of zero, it ends where the equations do."""
+    exact, (coarse, middle, fine) = ends(robot, state, torque, duration, (1e-3, 5e-4, 2.5e-4))
+    errors = [float(np.linalg.norm(end - exact)) for end in (coarse, middle, fine)]  # an angle counts as the way at 1 m
+    assert errors[0] > errors[1] > errors[2]
+    # the extrapolation removes the error of first order; a tenth is room for the second order, half would be too much
+    assert np.linalg.norm(2.0 * fine - middle - exact) < 0.1 * errors[1]
+
+
+def test_mujoco_converges_to_the_equations():
+    assert_limit_is_exact(CHUNG, START, TORQUE, 4.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mujoco_converges_for_a_robot_of_which_nothing_is_zero(seed):
+    """Offsets, mass centres, armatures, viscous friction, scrub, a motion at the start; four unlike casters."""
+    robot = solid_wheels(without_dry_friction(random_robot(seed, 4)))
+    rng = np.random.default_rng(seed)
+    state = np.concatenate(([0.1, -0.2, 0.5, 0.3, -0.2, 0.5], rng.uniform(-np.pi, np.pi, 4)))
+    assert_limit_is_exact(robot, state, rng.uniform(-0.3, 0.3, 8), 2.0)
+
+
+@pytest.mark.parametrize("name", ["tidybot2", "xr4000"])
+def test_mujoco_converges_for_the_robots_that_were_built(name):
+    robot = without_dry_friction(load_robot(name))
+    state = np.concatenate((np.zeros(6), [2.0, -1.0, 0.5, -2.5]))
+    assert_limit_is_exact(robot, state, np.tile([0.2, 0.1], 4), 2.0)
+
+
+def test_mujoco_contains_the_term_that_chung2008_lacks():
+    """(D1) is no matter of taste: without it the equations end far from where the bodies do."""
+    peer = simulate(CHUNG, START, TORQUE, 5e-4, 4.0).pose
+    exact, printed = (
+        Model(CHUNG, dynamics).simulate(START, TORQUE, STEP, round(4.0 / STEP))[-1]
+        for dynamics in ("exact", "chung2008")
+    )
+    assert path_length(peer) > 1.0  # [m]
+    off_exact, off_printed = (float(np.hypot(*(peer[-1] - end[:3])[:2])) for end in (exact, printed))
+    assert off_printed > 10.0 * off_exact  # 58 mm and 0.5 mm; 10 is room
+
+
+def test_joints_stand_where_their_names_say():
+    """Turning one joint of the peer moves what the robot's joint of that name moves."""
+    model = mujoco.MjModel.from_xml_string(mjcf(CHUNG, STEP))
+    platform, joints = joint_indices(CHUNG, model)
+    assert [model.joint(int(model.dof_jntid[i])).name for i in (*platform, *joints)] == ["x", "y", "yaw", *CHUNG.joints]
+    assert [model.actuator(i).name for i in range(model.nu)] == list(CHUNG.joints)
+
+
+def test_mass_of_the_peer_is_that_of_the_robot():
+    model = mujoco.MjModel.from_xml_string(mjcf(CHUNG, STEP))
+    assert model.body_mass.sum() == pytest.approx(5.0 + 3 * (0.5 + 0.1), rel=1e-12)  # rounding of a sum

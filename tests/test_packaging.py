@@ -1,0 +1,122 @@
+"""The package as others install it: whole, under one name, and light to import."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PACKAGES = PROJECT["tool"]["setuptools"]["packages"]
+HOMES = {"agents": "caster_gym.agents", "configs": "caster_gym.configs"}  # folders that stand at the top
+HEAVY = ("torch", "stable_baselines3", "matplotlib", "numba", "scipy", "mujoco")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, built from a copy of what the sources need, so that the checkout stays as it is."""
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    for name in ("caster_gym", *HOMES):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    pip("wheel", "--no-build-isolation", "--wheel-dir", out, source)
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """A folder with the wheel installed and nothing else."""
+    folder = tmp_path_factory.mktemp("installed")
+    pip("install", "--target", folder, wheel)
+    return folder
+
+
+def run(command, **options):
+    """What a command prints; its complaint if it fails."""
+    result = subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def pip(command, *arguments):
+    """A command of pip that touches no network and no dependency."""
+    options = ("--quiet", "--no-deps", "--no-index", "--disable-pip-version-check")
+    run([sys.executable, "-m", "pip", command, *options, *map(str, arguments)])
+
+
+def python(code, path, folder):
+    """What a fresh interpreter prints that sees `path` before its site-packages, the checkout not at all."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    environment["PYTHONPATH"] = str(path)
+    return run([sys.executable, "-P", "-c", code], cwd=folder, env=environment)
+
+
+def test_every_folder_of_the_package_is_listed():
+    """A forgotten one works in the checkout and is missing from the wheel."""
+    inside = {
+        ".".join(file.parent.relative_to(ROOT).parts)
+        for top in ("caster_gym", *HOMES)
+        for file in (ROOT / top).rglob("*.py")
+    }
+    folders = {HOMES.get(name, name) for name in inside}
+    assert folders == set(PACKAGES)
+    assert all((ROOT / name.replace(".", "/") / "__init__.py").is_file() for name in inside)
+
+
+def test_wheel_holds_one_top_level_package(wheel):
+    """A top-level `agents` would overwrite that of another distribution."""
+    names = zipfile.ZipFile(wheel).namelist()
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"caster_gym"}
+
+
+def test_wheel_holds_every_source_and_every_configuration(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    expected = {"caster_gym/py.typed"}
+    for top in ("caster_gym", *HOMES):
+        home = HOMES.get(top, top).replace(".", "/")
+        for pattern in ("*.py", "*.yaml"):
+            files = (ROOT / top).rglob(pattern)
+            expected |= {f"{home}/{file.relative_to(ROOT / top).as_posix()}" for file in files}
+    assert expected - names == set()
+
+
+def test_installed_wheel_works_without_the_checkout(installed, tmp_path):
+    code = (
+        "import importlib, json, caster_gym\n"
+        f"files = [importlib.import_module(name).__file__ for name in {PACKAGES!r}]\n"
+        "robots = {name: caster_gym.load_robot(name).caster_count for name in ('chung2008', 'tidybot2', 'xr4000')}\n"
+        "print(json.dumps([files, robots]))\n"
+    )
+    files, robots = json.loads(python(code, installed, tmp_path))
+    assert len(files) == len(PACKAGES)
+    assert all(Path(file).is_relative_to(installed) for file in files), files
+    assert robots == {"chung2008": 3, "tidybot2": 4, "xr4000": 4}
+
+
+@pytest.mark.parametrize(
+    "code", ["import caster_gym", "import caster_gym; caster_gym.Model(caster_gym.load_robot('chung2008'))"]
+)
+def test_import_leaves_heavy_libraries_alone(installed, tmp_path, code):
+    loaded = python(f"{code}\nimport sys\nprint(*sys.modules)", installed, tmp_path).split()
+    assert "caster_gym" in loaded
+    assert set(HEAVY) & set(loaded) == set()
+
+
+def test_environments_are_registered_by_the_import(installed, tmp_path):
+    code = "import caster_gym, gymnasium\nprint(*(name for name in gymnasium.registry if name.startswith('Caster')))"
+    assert "CasterTrack-v0" in python(code, installed, tmp_path).split()
+
+
+def test_version_is_told_once_and_for_all():
+    import caster_gym
+
+    assert caster_gym.__version__ == PROJECT["project"]["version"]

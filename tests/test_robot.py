@@ -1,0 +1,252 @@
+"""Robot files: what stands in them, what is refused, and whether the robots that come with the package are sound."""
+
+import copy
+
+import numpy as np
+import pytest
+import yaml
+
+from caster_gym import Model, Robot, load_robot
+from caster_gym.configuration import ConfigurationError
+
+ROBOTS = ("chung2008", "tidybot2", "xr4000")
+CASTER = {
+    "x": 0.2,
+    "y": 0.0,
+    "trail": 0.02,
+    "radius": 0.05,
+    "wheel": {"mass": 0.5, "spin_inertia": 6e-4, "yaw_inertia": 3e-4},
+    "link": {"mass": 1.0, "inertia": 1e-3},
+    "roll": {"max_torque": 1.0, "max_speed": 20.0},
+    "steer": {"max_torque": 1.0, "max_speed": 20.0},
+}
+GOOD = {
+    "name": "two_casters",
+    "platform": {"mass": 20.0, "inertia": 0.5, "footprint": {"disc": 0.3}},
+    "casters": [CASTER, {**CASTER, "x": -0.2}],
+}
+
+
+def write(folder, change=None):
+    """A robot file with one thing changed."""
+    content = copy.deepcopy(GOOD)
+    if change is not None:
+        change(content)
+    path = folder / "mine.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+def steering(robot, count=500):
+    return np.random.default_rng(0).uniform(-np.pi, np.pi, (count, robot.caster_count))
+
+
+def polygon(*corners):
+    return lambda robot: robot["platform"].update(footprint={"polygon": [list(corner) for corner in corners]})
+
+
+def rename_trail(robot):
+    robot["casters"][1]["trial"] = robot["casters"][1].pop("trail")
+
+
+REFUSED = {
+    "negative mass": (lambda r: r["platform"].update(mass=-5.0), ["platform.mass", "greater than 0", "-5"]),
+    "negative wheel mass": (lambda r: r["casters"][0]["wheel"].update(mass=-1.0), ["wheel.mass", "-1"]),
+    "zero trail": (lambda r: r["casters"][0].update(trail=0.0), ["trail", "greater than 0"]),
+    "misspelt key": (rename_trail, ["trial", "did you mean 'trail'"]),
+    "key too much": (lambda r: r.update(colour="red"), ["colour"]),
+    "missing key": (lambda r: r["platform"].pop("inertia"), ["platform.inertia", "missing"]),
+    "not a number": (lambda r: r["casters"][0].update(x=float("nan")), ["x", "finite", "nan"]),
+    "infinite": (lambda r: r["casters"][0]["roll"].update(max_speed=float("inf")), ["roll.max_speed", "inf"]),
+    "a word for a number": (lambda r: r["casters"][0].update(radius="wide"), ["radius", "'wide'"]),
+    "motors that turn together": (
+        lambda r: r["casters"][0].update(gear=[[1.0, 2.0], [2.0, 4.0]]),
+        ["gear", "invertible", "[[1.0, 2.0], [2.0, 4.0]]"],
+    ),
+    "gear of three columns": (lambda r: r["casters"][0].update(gear=[[1, 0, 0], [0, 1, 0]]), ["gear", "[1, 0, 0]"]),
+    "one caster": (lambda r: r["casters"].pop(), ["casters", "at least 2"]),
+    "casters on one spot": (lambda r: r["casters"][1].update(x=0.2), ["casters", "different places"]),
+    "unknown joint": (lambda r: r.update(actuation=["roll_1", "steer_9"]), ["steer_9", "roll_1, steer_1, roll_2"]),
+    "joint named twice": (lambda r: r.update(actuation=["roll_1", "roll_1"]), ["twice", "roll_1"]),
+    "no joint": (lambda r: r.update(actuation=[]), ["at least one joint"]),
+    "unknown actuation": (lambda r: r.update(actuation="some"), ["actuation", "'all'", "'some'"]),
+    "dent in the outline": (polygon((0, 0), (1, 0), (0.2, 0.2), (0, 1)), ["footprint", "convex", "0.2"]),
+    "clockwise outline": (polygon((0, 0), (0, 1), (1, 1), (1, 0)), ["footprint", "counter-clockwise"]),
+    "outline that crosses itself": (
+        polygon(*[(np.cos(a).item(), np.sin(a).item()) for a in 4.0 * np.pi / 5.0 * np.arange(5)]),
+        ["footprint", "convex"],
+    ),
+    "outline of two corners": (polygon((0, 0), (1, 0)), ["footprint.polygon", "at least 3"]),
+    "two outlines": (
+        lambda r: r["platform"]["footprint"].update(polygon=[[0, 0], [1, 0], [0, 1]]),
+        ["footprint", "exactly one of 'disc'"],
+    ),
+    "no outline": (lambda r: r["platform"].update(footprint={}), ["footprint", "exactly one of 'disc'"]),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_file_is_refused_by_key_value_and_file(tmp_path, case):
+    change, said = REFUSED[case]
+    path = write(tmp_path, change)
+    with pytest.raises(ConfigurationError) as caught:
+        load_robot(path)
+    for words in ["mine.yaml", *said]:
+        assert words in str(caught.value)
+
+
+def test_good_file_is_loaded_by_its_path(tmp_path):
+    path = write(tmp_path)
+    robot = load_robot(path)
+    assert robot == load_robot(str(path)) == Robot.model_validate(GOOD)
+    assert load_robot(robot) is robot
+
+
+def test_unknown_name_is_answered_with_the_known_ones():
+    with pytest.raises(ConfigurationError, match=r"unknown robot 'tidybot3'; known are .*chung2008.*tidybot2.*xr4000"):
+        load_robot("tidybot3")
+
+
+def test_missing_file_is_named():
+    with pytest.raises(ConfigurationError, match=r"no file .*nowhere\.yaml"):
+        load_robot("nowhere.yaml")
+
+
+def test_joints_alternate_between_rolling_and_steering(tmp_path):
+    robot = load_robot(write(tmp_path))
+    assert robot.joints == ("roll_1", "steer_1", "roll_2", "steer_2")
+    assert robot.driven == robot.joints
+    assert robot.with_actuation(["steer_2", "roll_1"]).driven == ("roll_1", "steer_2")
+    assert robot.with_actuation(["roll_1"]).with_actuation("all") == robot
+    with pytest.raises(ConfigurationError, match="steer_3"):
+        robot.with_actuation(["steer_3"])
+
+
+def test_time_step_may_not_exceed_trail_over_top_speed(tmp_path):
+    robot = load_robot(write(tmp_path))
+    assert robot.top_speed == pytest.approx(0.05 * 20.0)  # radius · max_speed
+    robot.check_time_step(0.02)  # = 0.02 m / 1 m/s
+    for bad in (0.0201, 0.0, -0.01, float("nan")):
+        with pytest.raises(ValueError, match=r"time step .*'two_casters'.* at most 0\.02 s"):
+            robot.check_time_step(bad)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robot_without_wheels_weighs_as_much_as_its_platform(name):
+    bare = load_robot(name).without_wheels()
+    p = bare.platform
+    cx, cy = p.com
+    expected = [
+        [p.mass, 0.0, -p.mass * cy],
+        [0.0, p.mass, p.mass * cx],
+        [-p.mass * cy, p.mass * cx, p.inertia + p.mass * (cx**2 + cy**2)],
+    ]
+    # nothing is left to add to the platform's matrix, so only its own rounding remains
+    np.testing.assert_allclose(Model(bare).inertia(steering(bare, 5)), np.broadcast_to(expected, (5, 3, 3)), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_inertia_is_positive_definite_and_no_less_than_the_mass(name):
+    robot = load_robot(name)
+    mass = robot.platform.mass + sum(caster.wheel.mass + caster.link.mass for caster in robot.casters)
+    matrices = Model(robot).inertia(steering(robot))
+    assert np.linalg.eigvalsh(matrices).min() > 0.0
+    # a caster resists by its own mass at least along its wheel; across it, its pivot moves less than the wheel's mass
+    assert matrices[:, 0, 0].min() > robot.platform.mass
+    assert matrices[:, 0, 0].mean() > 0.9 * mass
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_weight_rests_on_all_wheels(name):
+    robot = load_robot(name)
+    mass = robot.platform.mass + sum(caster.wheel.mass + caster.link.mass for caster in robot.casters)
+    loads = Model(robot).wheel_loads(steering(robot))
+    assert loads.min() > 0.05 * 9.81 * mass  # none is about to lift
+    np.testing.assert_allclose(loads.sum(axis=-1), 9.81 * mass, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_motors_can_push_in_every_direction_at_a_sensible_rate(name):
+    """At rest, 1 to 30 m/s² with the least-squares sharing of the motors' torques: neither toy nor missile."""
+    robot = load_robot(name)
+    model = Model(robot)
+    limits = np.array([[c.roll.max_torque, c.steer.max_torque] for c in robot.casters]).ravel()
+    gear = np.zeros((len(limits), len(limits)))
+    for i, caster in enumerate(robot.casters):
+        gear[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = caster.gear
+    for angles in steering(robot, 20):
+        wrenches = model.jacobian(angles).T @ gear.T * limits  # of each motor at its greatest torque
+        for heading in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
+            one = model.inertia(angles) @ [np.cos(heading), np.sin(heading), 0.0]  # for 1 m/s²
+            share = abs(np.linalg.pinv(wrenches) @ one).max()
+            assert 1.0 < 1.0 / share < 30.0
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robot_can_be_simulated_at_the_step_of_the_environments(name):
+    load_robot(name).check_time_step(0.005)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_wheels_stand_under_the_robot(name):
+    """Every pivot lies inside the footprint, so that a wall is met by the outline."""
+    robot = load_robot(name)
+    outline = robot.platform.footprint
+    pivots = np.array([[caster.x, caster.y] for caster in robot.casters])
+    if outline.disc is not None:
+        assert np.hypot(*pivots.T).max() < outline.disc
+    else:
+        corners = np.array(outline.polygon)
+        edges = np.roll(corners, -1, axis=0) - corners
+        to_pivots = pivots[:, None] - corners
+        assert (edges[:, 0] * to_pivots[..., 1] - edges[:, 1] * to_pivots[..., 0] > 0.0).all()
+
+
+def test_tidybot_wheel_rolls_about_the_point_its_makers_publish():
+    """Its wheel centre is (−0.014008, −0.003753) m from the pivot along and left of the rolling direction."""
+    robot = load_robot("tidybot2")
+    rng = np.random.default_rng(0)
+    for angles, twist in zip(steering(robot, 20), rng.uniform(-1.0, 1.0, (20, 3)), strict=True):
+        eta, theta, _ = Model(robot).rates(angles, twist)
+        for i, caster in enumerate(robot.casters):
+            f = np.exp(1j * angles[i])  # plane vectors as complex numbers: turning by 90° is multiplying by j
+            pivot = complex(twist[0], twist[1]) + 1j * twist[2] * complex(caster.x, caster.y)
+            centre = pivot + 1j * eta[i] * complex(-0.014008, -0.003753) * f
+            assert centre == pytest.approx(0.0508 * theta[i] * f, abs=1e-12)  # rounding of about 1 m/s
+
+
+def test_tidybot_motors_turn_as_its_gears_say():
+    """Motor speeds per joint rate, published: drive (50/14)(δ̇ − (19/25)(45/15) θ̇), steering (32/15)(60/10) δ̇."""
+    (drive_roll, drive_steer), steer = load_robot("tidybot2").casters[0].gear
+    first, second, third = 50.0 / 14.0, 19.0 / 25.0, 45.0 / 15.0
+    assert drive_steer / drive_roll == pytest.approx(first / -(first * second * third), rel=1e-12)
+    assert steer == (0.0, 1.0)
+
+
+def test_xr4000_casters_are_the_published_bodies():
+    """Wheel and link together: 2.72 kg, 0.010 m behind the pivot, 3.32e-3 kg m² and the gears that turn with them."""
+    caster = load_robot("xr4000").casters[0]
+    wheel, link = caster.wheel, caster.link
+    mass = wheel.mass + link.mass
+    behind = (wheel.mass * caster.trail + link.mass * link.com[0]) / mass
+    yaw = (
+        wheel.yaw_inertia
+        + link.inertia
+        + wheel.mass * (caster.trail - behind) ** 2
+        + link.mass * (link.com[0] - behind) ** 2
+    )
+    assert mass == pytest.approx(2.72, rel=1e-12)
+    assert behind == pytest.approx(0.010, rel=1e-5)  # the file holds six digits
+    assert yaw == pytest.approx(3.32e-3 + 4.78e-4 + 1.74e-5, rel=1e-5)
+
+
+def test_xr4000_armatures_are_its_rotors_and_gears_at_the_joints():
+    """Energy of all that turns, at 1 rad/s of one joint: rotors at their gear ratios, vertical gears at twice θ̇."""
+    caster = load_robot("xr4000").casters[0]
+    steer_rotor, drive_rotor, gears = 7.11e-5, 8.53e-5, 4.78e-4 + 1.74e-5
+    at_wheel, to_motor = 2.0, 85.0 / 35.0
+    rolling = gears * at_wheel**2 + drive_rotor * (at_wheel * to_motor) ** 2
+    turning = steer_rotor * 4.0**2 + drive_rotor * to_motor**2
+    assert caster.roll.armature == pytest.approx(rolling, rel=1e-5)  # the file holds six digits
+    assert caster.steer.armature == pytest.approx(turning, rel=1e-5)
+    assert caster.gear[0][1] == -1.0 / at_wheel
