@@ -41,40 +41,38 @@ class TrackingEngine:
         self._casters = tuple(range(robot.caster_count))
         self._preview = tuple(range(len(task.preview)))
         self._parallel = block_count(count) >= PARALLEL_FROM
-        self._table(longest)
-        self._slots = np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints])
         self._spread = np.array([task.start_offset, task.start_turn])
         self._report_rows = kernel.FIXED_REPORT_ROWS + 2 * robot.caster_count
+        samples, spans = _table(self.trajectories, longest)
+        self._world = kernel.World(
+            blocks=self._fresh_blocks(),
+            clocks=np.zeros((2, count), dtype=np.int64),
+            seeds=np.zeros((2, count), dtype=np.uint64),
+            slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
+            samples=samples,
+            spans=spans,
+            horizons=np.array([round(s / task.control_period) for s in task.preview], dtype=np.int64),
+            substeps=task.substeps,
+            time_step=task.time_step,
+        )
 
-        blocks = block_count(count)
-        fixed = np.array([(*task.weights(), *pack_parameters(robot_parameters(robot)))])
+    def _fresh_blocks(self) -> NDArray[np.float64]:
+        """Blocks that hold the weights and the robot's parameters."""
+        fixed = np.array([(*self.task.weights(), *pack_parameters(robot_parameters(self.robot)))])
         first = kernel.weight_row(self._casters, self._preview)
-        self._blocks = np.zeros((blocks, (first + fixed.shape[1]) * LANES))
-        to_lanes(np.repeat(fixed, count, axis=0), self._blocks, first)
-        self._clocks = np.zeros((2, count), dtype=np.int64)
-        self._seeds = np.zeros((2, count), dtype=np.uint64)
-
-    def _table(self, longest: int | None) -> None:
-        """All trajectories in one table, with each one's first and last row and number of steps."""
-        self._samples = np.ascontiguousarray(np.concatenate([t.samples for t in self.trajectories]))
-        ends = np.cumsum([len(t.samples) for t in self.trajectories])
-        starts = ends - [len(t.samples) for t in self.trajectories]
-        steps = ends - starts - 1
-        limit = steps if longest is None else np.minimum(steps, longest)
-        self._spans = np.stack([starts, ends - 1, limit], axis=1).astype(np.int64)
-        self._horizons = np.array([round(s / self.task.control_period) for s in self.task.preview], dtype=np.int64)
+        blocks = np.zeros((block_count(self.count), (first + fixed.shape[1]) * LANES))
+        to_lanes(np.repeat(fixed, self.count, axis=0), blocks, first)
+        return blocks
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
-        self._seeds[:, robot] = key, 0
+        self._world.seeds[:, robot] = key, 0
 
     def restart(self, selected: NDArray[np.int64], into: Outcome | None = None) -> Outcome:
         """Start new episodes of the selected robots; the others' entries are those of `into`, or zero."""
         outcome = self._empty() if into is None else into
-        kernel.restart(
-            selected, self._blocks, self._clocks, self._seeds, self._samples, self._spans, self._horizons, self._spread,
-            outcome.observations, outcome.reports, self._casters, self._preview,
-        )  # fmt: skip
+        views = kernel.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
+        kernel.restart(selected, self._world, self._spread, views, self._casters, self._preview)
         return outcome
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
@@ -86,10 +84,7 @@ class TrackingEngine:
             step = kernel.step_single
         else:
             step = kernel.step_parallel if self._parallel else kernel.step_serial
-        step(
-            self._blocks, self._clocks, actions, self._slots, self._samples, self._spans, self._horizons,
-            self.task.substeps, self.task.time_step, observations, reports, results, self._casters, self._preview,
-        )  # fmt: skip
+        step(self._world, actions, kernel.Views(observations, reports, results), self._casters, self._preview)
         return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
 
     def _empty(self) -> Outcome:
@@ -106,16 +101,25 @@ class TrackingEngine:
     @property
     def states(self) -> NDArray[np.float64]:
         """A copy of all states (robots, 7 + 2 N), laid out as in `caster_gym.engines.numba_fleet.Fleet`."""
-        return from_lanes(self._blocks, 0, kernel.command_row(self._casters), self.count)
+        return from_lanes(self._world.blocks, 0, kernel.command_row(self._casters), self.count)
 
     @states.setter
     def states(self, value: NDArray[np.float64]) -> None:
-        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._blocks, 0)
+        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, 0)
 
     @property
     def paths(self) -> NDArray[np.int64]:
         """Which trajectory each robot follows (robots,), as a copy."""
-        return self._clocks[1].copy()
+        return np.array(self._world.clocks[1])
+
+
+def _table(trajectories: Sequence[Trajectory], longest: int | None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """All trajectories in one table (rows, 10), with each one's first and last row and control periods (paths, 3)."""
+    lengths = np.array([len(t.samples) for t in trajectories])
+    ends = np.cumsum(lengths)
+    periods = lengths - 1 if longest is None else np.minimum(lengths - 1, longest)
+    samples = np.ascontiguousarray(np.concatenate([t.samples for t in trajectories]))
+    return samples, np.stack([ends - lengths, ends - 1, periods], axis=1).astype(np.int64)
 
 
 def info_of(reports: NDArray[np.float64]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ are part of their types, so that all rows are constants of the compiled code.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -41,6 +41,28 @@ _WEIGHTS = (0.0,) * WEIGHT_ROWS
 
 teach(tracking)
 teach(randomness)
+
+
+class World(NamedTuple):
+    """What a batch keeps from step to step."""
+
+    blocks: Any  # float64 (blocks, rows · LANES)
+    clocks: Any  # int64 (2, robots): control periods done, path
+    seeds: Any  # uint64 (2, robots): key, episode
+    slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
+    samples: Any  # float64 (rows of all paths, 10)
+    spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
+    horizons: Any  # int64 (previewed points,): control periods ahead
+    substeps: Any
+    time_step: Any  # [s]
+
+
+class Views(NamedTuple):
+    """Where compiled code leaves what Python reads."""
+
+    observations: Any  # float32 (robots, size)
+    reports: Any  # float64 (quantities, robots)
+    results: Any  # float64 (3, robots): reward, terminated, truncated
 
 
 @register_jitable(**INLINE)
@@ -134,92 +156,73 @@ def _look(block: Any, first: Any, lanes: Any, casters: Any, preview: Any) -> Non
 
 
 @register_jitable(**INLINE)
-def _fetch(block: Any, lane: Any, clock: Any, path: Any, samples: Any, spans: Any, horizons: Any, casters: Any) -> None:
+def _fetch(block: Any, lane: Any, robot: Any, world: World, casters: Any) -> None:
     """Copy a robot's reference and previewed points from the table of all paths; the last row of a path stays."""
+    clock, path = world.clocks[0, robot], world.clocks[1, robot]
     row = reference_row(casters)
-    base, end = spans[path, 0], spans[path, 1]
+    base, end = world.spans[path, 0], world.spans[path, 1]
     now = min(base + clock, end)
     for j in range(REFERENCE_ROWS):
-        block[(row + j) * LANES + lane] = samples[now, j]
+        block[(row + j) * LANES + lane] = world.samples[now, j]
     row += REFERENCE_ROWS
-    for p in range(len(horizons)):
-        then = min(base + clock + horizons[p], end)
+    for p in range(len(world.horizons)):
+        then = min(base + clock + world.horizons[p], end)
         for j in range(POINT_ROWS):
-            block[(row + p * POINT_ROWS + j) * LANES + lane] = samples[then, j]
+            block[(row + p * POINT_ROWS + j) * LANES + lane] = world.samples[then, j]
 
 
 @register_jitable(**INLINE)
-def _deliver(block: Any, lane: Any, robot: Any, observations: Any, reports: Any, casters: Any, preview: Any) -> None:
+def _deliver(block: Any, lane: Any, robot: Any, views: Views, casters: Any, preview: Any) -> None:
     """Copy a robot's observation and report to where Python reads them."""
     row = observation_row(casters, preview)
-    for j in range(observations.shape[1]):
-        observations[robot, j] = block[(row + j) * LANES + lane]
+    for j in range(views.observations.shape[1]):
+        views.observations[robot, j] = block[(row + j) * LANES + lane]
     row = report_row(casters, preview)
-    for j in range(reports.shape[0]):
-        reports[j, robot] = block[(row + j) * LANES + lane]
-    reports[HEADING_SIN, robot] = math.atan2(reports[HEADING_SIN, robot], reports[HEADING_COS, robot])
+    for j in range(views.reports.shape[0]):
+        views.reports[j, robot] = block[(row + j) * LANES + lane]
+    sin, cos = views.reports[HEADING_SIN, robot], views.reports[HEADING_COS, robot]
+    views.reports[HEADING_SIN, robot] = math.atan2(sin, cos)
 
 
 @register_jitable(**INLINE)
-def _step_lanes(
-    i: Any, lanes: Any, blocks: Any, clocks: Any, actions: Any, slots: Any, samples: Any, spans: Any, horizons: Any,
-    substeps: Any, h: Any, observations: Any, reports: Any, results: Any, casters: Any, preview: Any,
-) -> None:  # fmt: skip
-    """One control period of the robots of block i. clocks (2, robots): steps done, path; results (3, robots)."""
-    block = blocks[i]
+def _step_lanes(i: Any, lanes: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+    """One control period of the robots of block i."""
+    block = world.blocks[i]
     first = i * LANES
     here = min(lanes, len(actions) - first)
     row = command_row(casters)
     for lane in range(here):
-        for j in range(len(slots)):
-            command = 0.0 if slots[j] < 0 else float(actions[first + lane, slots[j]])
+        for j in range(len(world.slots)):
+            slot = world.slots[j]
+            command = 0.0 if slot < 0 else float(actions[first + lane, slot])
             block[(row + j) * LANES + lane] = min(max(command, -1.0), 1.0)
-    _drive(block, lanes, substeps, h, casters, preview)
+    _drive(block, lanes, world.substeps, world.time_step, casters, preview)
     for lane in range(here):
-        clocks[0, first + lane] += 1
-        _fetch(block, lane, clocks[0, first + lane], clocks[1, first + lane], samples, spans, horizons, casters)
+        world.clocks[0, first + lane] += 1
+        _fetch(block, lane, first + lane, world, casters)
     _look(block, 0, lanes, casters, preview)
     for lane in range(here):
         robot = first + lane
-        _deliver(block, lane, robot, observations, reports, casters, preview)
+        _deliver(block, lane, robot, views, casters, preview)
         reward = 0.0
         for j in range(TERMS):
-            reward += reports[FIRST_TERM + j, robot]
-        path = clocks[1, robot]
-        results[0, robot] = reward
-        results[1, robot] = reports[0, robot] + reports[1, robot]
-        results[2, robot] = 1.0 if clocks[0, robot] >= spans[path, 2] else 0.0
+            reward += views.reports[FIRST_TERM + j, robot]
+        views.results[0, robot] = reward
+        views.results[1, robot] = views.reports[0, robot] + views.reports[1, robot]
+        views.results[2, robot] = 1.0 if world.clocks[0, robot] >= world.spans[world.clocks[1, robot], 2] else 0.0
 
 
-def _step_block(
-    i, blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports, results,
-    casters, preview,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    _step_lanes(
-        i, LANES, blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports,
-        results, casters, preview,
-    )  # fmt: skip
+def _step_block(i: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+    _step_lanes(i, LANES, world, actions, views, casters, preview)
 
 
-def _step_single(
-    blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports, results,
-    casters, preview,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    _step_lanes(
-        0, 1, blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports,
-        results, casters, preview,
-    )  # fmt: skip
+def _step_single(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+    _step_lanes(0, 1, world, actions, views, casters, preview)
 
 
-def _step_all(
-    blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports, results,
-    casters, preview,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    for i in numba.prange(len(blocks)):
-        step_block(
-            i, blocks, clocks, actions, slots, samples, spans, horizons, substeps, h, observations, reports, results,
-            casters, preview,
-        )  # fmt: skip
+def _step_all(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+    for i in numba.prange(len(world.blocks)):
+        step_block(i, world, actions, views, casters, preview)
 
 
 @register_jitable(**INLINE)
@@ -228,20 +231,18 @@ def _random_direction(key: Any, episode: Any, index: Any) -> Any:
     return math.cos(angle), math.sin(angle)
 
 
-def _restart(
-    selected, blocks, clocks, seeds, samples, spans, horizons, spread, observations, reports, casters, preview
-):  # type: ignore[no-untyped-def]
-    """Start new episodes of the selected robots. seeds (2, robots): key, episode; spread: greatest offset, turn."""
+def _restart(selected: Any, world: World, spread: Any, views: Views, casters: Any, preview: Any) -> None:
+    """Start new episodes of the selected robots; spread: greatest offset along an axis [m] and turn [rad]."""
     for robot in selected:
-        block, lane = blocks[robot // LANES], robot % LANES
-        key, episode = seeds[0, robot], seeds[1, robot]
-        seeds[1, robot] = episode + np.uint64(1)
-        path = int(uniform(key, episode, np.uint64(0)) * len(spans))
-        clocks[0, robot], clocks[1, robot] = 0, path
+        block, lane = world.blocks[robot // LANES], robot % LANES
+        key, episode = world.seeds[0, robot], world.seeds[1, robot]
+        world.seeds[1, robot] = episode + np.uint64(1)
+        world.clocks[0, robot] = 0
+        world.clocks[1, robot] = int(uniform(key, episode, np.uint64(0)) * len(world.spans))
         x = (2.0 * uniform(key, episode, np.uint64(1)) - 1.0) * spread[0]
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
         turn = (2.0 * uniform(key, episode, np.uint64(3)) - 1.0) * spread[1]
-        _fetch(block, lane, 0, path, samples, spans, horizons, casters)
+        _fetch(block, lane, robot, world, casters)
         reference = Reference(*read(block, lane, reference_row(casters), _REFERENCE))
         directions = each(_random_direction, (key, episode), counting(casters))
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
@@ -249,7 +250,7 @@ def _restart(
         for row in range(command_row(casters), reference_row(casters)):
             block[row * LANES + lane] = 0.0
         _look(block, lane, 1, casters, preview)
-        _deliver(block, lane, robot, observations, reports, casters, preview)
+        _deliver(block, lane, robot, views, casters, preview)
 
 
 step_block = compiled(_step_block)
