@@ -1,0 +1,123 @@
+"""A policy on disk: a folder with weights as safetensors and everything else as YAML. Loading it runs no code.
+
+    policy.yaml            what the policy is, for which robot and task, and how it came about
+    weights.safetensors    the actor's weights
+"""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+import yaml
+from pydantic import PositiveInt
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+
+from caster_gym.agents.actor import Actor, LearnedAgent, Squash
+from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.track_task import TrackTask
+from caster_gym.robot import Robot
+
+FORMAT = 1
+DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
+
+
+class PolicyDescription(Frozen):
+    """All that is needed to act again, and to know where the policy came from."""
+
+    format: Literal[1]
+    name: str
+    squash: Squash
+    hidden: tuple[PositiveInt, ...]
+    robot: Robot
+    task: TrackTask
+    trained_with: dict[str, Any]  # settings, seed, steps
+    versions: dict[str, str]
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """What the policy's observations mean."""
+        return ObservationLayout(self.robot, self.task.preview)
+
+
+class Bundle:
+    """A learned agent together with its description."""
+
+    def __init__(self, description: PolicyDescription, actor: Actor) -> None:
+        self.description = description
+        self.agent = LearnedAgent(actor, description.name)
+
+    def check_fits(self, layout: ObservationLayout) -> None:
+        """Raises ValueError if the policy cannot act on observations of that layout."""
+        ours = self.description.layout
+        if ours.robot.joints != layout.robot.joints or ours.robot.driven != layout.robot.driven:
+            raise ValueError(
+                f"the policy drives {', '.join(ours.robot.driven)} of {ours.robot.name!r}, "
+                f"the task {', '.join(layout.robot.driven)} of {layout.robot.name!r}"
+            )
+        if ours.preview != layout.preview:
+            raise ValueError(f"the policy needs a preview of {ours.preview} s, the task shows {layout.preview} s")
+
+
+def save_bundle(folder: Path, bundle: Bundle) -> None:
+    """Write a bundle to a folder that comes into being whole or not at all; one that is there is replaced."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        weights = {name: tensor.contiguous() for name, tensor in bundle.agent.actor.state_dict().items()}
+        save_file(weights, fresh / WEIGHTS)
+        content = bundle.description.model_dump(mode="json")
+        (fresh / DESCRIPTION).write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        fresh.chmod(0o755)
+        old = fresh.with_name(fresh.name + "-old")
+        if folder.exists():
+            os.replace(folder, old)
+        os.replace(fresh, folder)
+        shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def load_bundle(folder: Path) -> Bundle:
+    """Read a bundle. Raises ConfigurationError that says what is missing or does not fit."""
+    content = read_yaml(folder / DESCRIPTION)
+    if content.get("format") != FORMAT:
+        raise ConfigurationError(
+            f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
+        )
+    description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
+    actor = Actor(
+        description.layout.size, description.hidden, len(description.robot.driven), description.squash
+    )
+    _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
+    return Bundle(description, actor)
+
+
+def _read_weights(path: Path) -> dict[str, torch.Tensor]:
+    try:
+        return load_file(path)
+    except FileNotFoundError:
+        raise ConfigurationError(f"there is no file {str(path)!r}") from None
+    except (SafetensorError, OSError) as error:
+        raise ConfigurationError(f"{path} holds no weights: {error}") from error
+
+
+def _fill(actor: Actor, weights: Mapping[str, torch.Tensor], path: Path) -> None:
+    """Give an actor weights of the right names, shapes and type."""
+    wanted = actor.state_dict()
+    for name in sorted(wanted.keys() ^ weights.keys()):
+        raise ConfigurationError(f"{path}: weight {name!r} is {'missing' if name in wanted else 'not known'}")
+    for name, tensor in weights.items():
+        if tensor.shape != wanted[name].shape or tensor.dtype != wanted[name].dtype:
+            raise ConfigurationError(
+                f"{path}: weight {name!r} must be {tuple(wanted[name].shape)} {wanted[name].dtype}, "
+                f"got {tuple(tensor.shape)} {tensor.dtype}"
+            )
+        if not torch.isfinite(tensor).all():
+            raise ConfigurationError(f"{path}: weight {name!r} holds numbers that are not finite")
+    actor.load_state_dict(dict(weights))

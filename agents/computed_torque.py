@@ -1,0 +1,124 @@
+"""Computed torque: feedback linearisation in operational space, and torques within the motors' limits.
+
+    e, ė     reference minus robot: position, heading, and their rates, components in B
+    a        wanted acceleration a_ref + k_d ė + k_p e                [m/s², rad/s²]
+    F        M v̇ + h + friction, with v̇ the rate of the twist's components that a means
+
+With the exact model every error obeys ë + k_d ė + k_p e = 0 while no motor is at its limit.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.agents.torque_distribution import distribute
+from caster_gym.analysis.actuation import warn_if_singular
+from caster_gym.engines.numpy_model import Model
+from caster_gym.envs.observation import ObservationLayout
+from caster_gym.mechanics.motors import torque_range
+from caster_gym.robot import Robot
+
+Array = NDArray[np.float64]
+KnownModel = Literal["exact", "without D1", "without wheels"]
+
+
+class Gains(NamedTuple):
+    """Feedback gains k_p [1/s²] and k_d [1/s]."""
+
+    stiffness: float
+    damping: float
+
+
+def gains(natural_frequency: float, period: float) -> Gains:
+    """Gains that put both poles of a double integrator, held over a period [s], at exp(−ω_n · period).
+
+    A controller that holds its output sees e_{k+1} = e_k + T ė_k + ½T² u and ė_{k+1} = ė_k + T u; matching the
+    characteristic polynomial to (z − p)² gives the gains below, critically damped however long the period is.
+    """
+    p = np.exp(-natural_frequency * period)
+    return Gains(float((1.0 - p) ** 2 / period**2), float((1.0 - p) * (3.0 + p) / (2.0 * period)))
+
+
+def known_model(robot: Robot, known: KnownModel) -> Model:
+    """What the controller knows of the robot; the incomplete ones are those that the literature uses."""
+    if known == "exact":
+        return Model(robot)
+    if known == "without D1":
+        return Model(robot, dynamics="chung2008")
+    if known == "without wheels":
+        return Model(robot.without_wheels())
+    raise ValueError(f"known must be 'exact', 'without D1' or 'without wheels', got {known!r}")
+
+
+class ComputedTorque:
+    """Model-based tracking of the reference that the observation shows.
+
+    natural_frequency [rad/s] of the errors, period [s] between actions.
+    """
+
+    def __init__(
+        self, layout: ObservationLayout, natural_frequency: float, period: float, known: KnownModel = "exact"
+    ) -> None:
+        if natural_frequency <= 0.0:
+            raise ValueError(f"natural_frequency must be positive, got {natural_frequency}")
+        warn_if_singular(layout.robot)
+        self.layout, self.period, self.known = layout, period, known
+        self.gains = gains(natural_frequency, period)
+        self._model = known_model(layout.robot, known)
+        robot = layout.robot
+        self._driven = [robot.joints.index(joint) for joint in robot.driven]
+        self._gears = np.array([caster.gear for caster in robot.casters])
+        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
+        self._max_torque = np.array([motor.max_torque for motor in motors])[self._driven]
+        self._max_speed = np.array([motor.max_speed for motor in motors])[self._driven]
+        self._length = float(np.sqrt(np.mean([caster.x**2 + caster.y**2 for caster in robot.casters])))
+
+    @property
+    def name(self) -> str:
+        """Name with the model that the controller knows."""
+        return "computed torque" if self.known == "exact" else f"computed torque {self.known}"
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (robots, driven joints) for observations (robots, size)."""
+        see = self.layout.physical
+        cos_sin = see(observations, "directions").reshape(len(observations), -1, 2)
+        steering = np.arctan2(cos_sin[..., 1], cos_sin[..., 0])
+        twist = see(observations, "twist")
+        force = self._model.inverse_dynamics(steering, twist, self._twist_rate(observations, twist))
+        rows = self._motor_rows(steering)
+        speeds = np.einsum("rmi,ri->rm", rows, twist)
+        low, high = torque_range(speeds, np.ones_like(speeds), self._max_speed)
+        b = rows.mT * self._max_torque
+        b[:, 2] /= self._length
+        force[:, 2] /= self._length
+        return distribute(b, force, low, high).astype(np.float32)
+
+    def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
+        """Rate of the twist's components (robots, 3) that brings the errors down as the gains say."""
+        see = self.layout.physical
+        heading = see(observations, "heading_error")
+        turn = np.arctan2(heading[:, 1], heading[:, 0])
+        error = np.concatenate([see(observations, "position_error"), turn[:, None]], axis=1)
+        rate = see(observations, "twist_error")
+        wanted = self._mean_acceleration(observations, twist + rate)
+        wanted = wanted + self.gains.damping * rate + self.gains.stiffness * error
+        wanted[:, 0] += twist[:, 2] * twist[:, 1]
+        wanted[:, 1] -= twist[:, 2] * twist[:, 0]
+        return wanted
+
+    def _mean_acceleration(self, observations: NDArray[np.float32], velocity: Array) -> Array:
+        """Reference acceleration (robots, 3) in the middle of the coming period, with the jerk that the preview shows."""
+        now = self.layout.physical(observations, "reference_acceleration")
+        if not self.layout.preview:
+            return now
+        horizon = min(self.layout.preview)
+        later = self.layout.physical(observations, f"preview_{horizon:g}s")[:, 4:]
+        jerk = 2.0 * (later - velocity - horizon * now) / horizon**2
+        return now + 0.5 * self.period * jerk
+
+    def _motor_rows(self, steering: Array) -> Array:
+        """Rows (robots, driven, 3) that give the driven motors' speeds from the twist."""
+        joints = self._model.jacobian(steering).reshape(len(steering), -1, 2, 3)
+        motors: Array = (self._gears @ joints).reshape(len(steering), -1, 3)
+        return motors[:, self._driven]

@@ -1,0 +1,49 @@
+"""Where a result came from: versions, commit and settings, written beside it."""
+
+import platform
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import caster_gym
+
+PACKAGES = ("numpy", "numba", "gymnasium", "torch", "stable-baselines3", "daqp", "scipy")
+
+
+def versions() -> dict[str, str]:
+    """Versions of caster_gym, its commit, Python and the packages that results depend on."""
+    found = {"caster_gym": caster_gym.__version__, "commit": commit(), "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def commit() -> str:
+    """Commit of the checkout that runs, with "+" if files differ from it; "unknown" for an installed package."""
+    folder = Path(caster_gym.__file__).parent
+    try:
+        hash_ = _git(folder, "rev-parse", "--short=12", "HEAD")
+        tracked = _git(folder, "ls-files", "__init__.py")
+        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return (hash_ + ("+" if changed else "")) if tracked else "unknown"
+
+
+def write_provenance(folder: Path, **content: Any) -> None:
+    """run.yaml: the command, the versions, and whatever else tells how a result came about."""
+    folder.mkdir(parents=True, exist_ok=True)
+    full = {"command": " ".join([Path(sys.argv[0]).name, *sys.argv[1:]]), "versions": versions(), **content}
+    (folder / "run.yaml").write_text(yaml.safe_dump(full, sort_keys=False, allow_unicode=True), encoding="utf-8")
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    result = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True, timeout=10)
+    return result.stdout.strip()

@@ -1,0 +1,146 @@
+"""Typed settings of tasks, agents and comparisons; the YAML files in configs/ hold what differs from the defaults."""
+
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
+
+from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, model_validator
+
+from caster_gym.agents.computed_torque import KnownModel
+from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.envs.track_task import TrackTask
+from caster_gym.paths.specification import PathSpecification
+
+Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
+Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
+
+
+class TaskSettings(Frozen):
+    """A robot, its task, and the paths to train, to choose and to test on."""
+
+    robot: str = "chung2008"  # name, or path of a YAML file
+    actuation: Literal["all"] | tuple[str, ...] | None = None  # None: as the robot file says
+    task: TrackTask = TrackTask()
+    train: Paths
+    validation: Paths
+    test: Paths
+
+    @model_validator(mode="after")
+    def _paths_are_held_out(self) -> Self:
+        for kind, others in (("test", self.test), ("validation", self.validation)):
+            shared = [path for path in others if path in self.train]
+            if shared:
+                raise ValueError(f"a {kind} path must not be among the training paths, got {shared[0]!r} in both")
+        if any(path in self.validation for path in self.test):
+            raise ValueError("a test path must not be among the validation paths")
+        return self
+
+
+class Learner(Frozen):
+    """What PPO and SAC have in common."""
+
+    hidden: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (128, 128)  # units of each layer, ReLU
+    discount: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.97  # per control period
+    learning_rate: PositiveFloat
+    falling: bool = True  # learning rate falls linearly to zero
+    validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
+
+
+class PPOSettings(Learner):
+    """Proximal policy optimisation (Schulman et al., 2017), by Stable-Baselines3."""
+
+    algorithm: Literal["ppo"]
+    steps: PositiveInt = 2_000_000  # control periods of all robots together
+    learning_rate: PositiveFloat = 7e-4
+    robots: PositiveInt = 128
+    horizon: PositiveInt = 128  # control periods between updates
+    batch: PositiveInt = 2048
+    epochs: PositiveInt = 5
+    trace: Fraction = 0.95  # λ of generalised advantage estimation
+    clip: PositiveFloat = 0.2
+    initial_log_std: float = -0.7
+    entropy: Annotated[float, Field(ge=0.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _batches_fit(self) -> Self:
+        if self.batch > self.robots * self.horizon:
+            raise ValueError(
+                f"a batch of {self.batch} needs at most robots · horizon = {self.robots * self.horizon} steps"
+            )
+        return self
+
+
+class SACSettings(Learner):
+    """Soft actor-critic (Haarnoja et al., 2018), by Stable-Baselines3."""
+
+    algorithm: Literal["sac"]
+    steps: PositiveInt = 600_000
+    learning_rate: PositiveFloat = 1e-3
+    robots: PositiveInt = 32
+    batch: PositiveInt = 512
+    updates: PositiveInt = 4  # gradient steps for each control period of all robots
+    buffer: PositiveInt = 600_000  # transitions
+    first_random: PositiveInt = 10_000  # steps before learning starts
+    soft_update: Fraction = 0.005
+
+
+class ComputedTorqueSettings(Frozen):
+    """Model-based control; its natural frequency is the one of those listed that does best on validation paths."""
+
+    algorithm: Literal["computed torque"]
+    known: KnownModel = "exact"
+    natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
+
+
+LearnerSettings: TypeAlias = Annotated[PPOSettings | SACSettings, Field(discriminator="algorithm")]
+AgentSettings: TypeAlias = Annotated[
+    PPOSettings | SACSettings | ComputedTorqueSettings, Field(discriminator="algorithm")
+]
+
+
+class NamedAgent(Frozen):
+    """Wraps an agent's settings, so that a file of its own can be read."""
+
+    agent: AgentSettings
+
+
+class BenchmarkSettings(Frozen):
+    """Which agents are compared, and how."""
+
+    task: str = "track"  # name of a file in configs/tasks, or path of one
+    agents: Annotated[tuple[str, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
+    seeds: Annotated[tuple[int, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
+    starts: PositiveInt = 1  # episodes on each test path, with different starts
+    start_seed: int = 1000  # the same starts for every agent
+    settling: PositiveFloat = 2.0  # [s] what comes before counts as transient
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+
+
+Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def find(kind: str, name: str) -> Path:
+    """The file of a task, agent or benchmark: one that comes with the package, by its name, or a path."""
+    path = Path(name).expanduser()
+    if path.suffix in (".yaml", ".yml"):
+        return path
+    folder = Path(str(files("caster_gym.configs"))) / kind
+    path = folder / f"{name}.yaml"
+    if not path.is_file():
+        known = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
+        raise ConfigurationError(f"there is no {name!r} in {kind}; known are {known}, or give the path of a YAML file")
+    return path
+
+
+def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
+    """Checked settings from a file that `find` finds."""
+    path = find(kind, name)
+    return parse(model, read_yaml(path), str(path))
+
+
+def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> PPOSettings | SACSettings | ComputedTorqueSettings:
+    """Checked settings of an agent, with some fields changed."""
+    path = find("agents", name)
+    content = {**read_yaml(path), **(changes or {})}
+    return parse(NamedAgent, {"agent": content}, str(path)).agent

@@ -1,0 +1,221 @@
+"""Training a policy: Stable-Baselines3 on the native batch, the best policy chosen on validation paths.
+
+Optimisers turn denormal numbers and thread counts into different last bits, but never into other randomness: with the
+same settings, seed and versions on the same machine, a training run repeats.
+"""
+
+import csv
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+from caster_gym.agents.actor import Actor
+from caster_gym.agents.bundle import Bundle, PolicyDescription, save_bundle
+from caster_gym.agents.evaluation import measure, roll_out, test_batch, training_batch
+from caster_gym.agents.provenance import versions, write_provenance
+from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.settings import Learner, PPOSettings, SACSettings, TaskSettings
+from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+
+VALIDATION_SEED = 500
+SETTLING = 2.0  # [s]
+Report = Callable[[int, float], None]  # called with steps done and the last validation error [m]
+
+
+class Validation(NamedTuple):
+    """How good a policy is on validation paths."""
+
+    steps: int
+    seconds: float  # of training so far, validations left out
+    position_rmse: float  # [m] root mean square over episodes, after settling
+    worst_position: float  # [m]
+    heading_rmse: float  # [rad]
+    failures: int
+    reward: float  # mean per step
+
+    @property
+    def merit(self) -> tuple[int, float]:
+        """What makes a policy better than another: fewer failures, then a smaller error."""
+        return -self.failures, -self.position_rmse
+
+
+def make_learner(settings: PPOSettings | SACSettings, environment: CasterVecEnv, seed: int) -> BaseAlgorithm:
+    """A fresh SB3 algorithm."""
+    rate = settings.learning_rate
+    schedule = (lambda remaining: rate * max(remaining, 0.0)) if settings.falling else rate
+    policy: dict[str, Any] = {"net_arch": list(settings.hidden), "activation_fn": torch.nn.ReLU}
+    if isinstance(settings, PPOSettings):
+        return PPO(
+            "MlpPolicy",
+            environment,
+            learning_rate=schedule,
+            n_steps=settings.horizon,
+            batch_size=settings.batch,
+            n_epochs=settings.epochs,
+            gamma=settings.discount,
+            gae_lambda=settings.trace,
+            clip_range=settings.clip,
+            ent_coef=settings.entropy,
+            policy_kwargs={**policy, "log_std_init": settings.initial_log_std},
+            seed=seed,
+            device="cpu",
+        )
+    return SAC(
+        "MlpPolicy",
+        environment,
+        learning_rate=schedule,
+        buffer_size=settings.buffer,
+        learning_starts=settings.first_random,
+        batch_size=settings.batch,
+        tau=settings.soft_update,
+        gamma=settings.discount,
+        train_freq=1,
+        gradient_steps=settings.updates,
+        policy_kwargs=policy,
+        seed=seed,
+        device="cpu",
+    )
+
+
+def actor_of(learner: BaseAlgorithm, settings: Learner) -> Actor:
+    """The deterministic part of a learner's policy, with a copy of its weights."""
+    policy: Any = learner.policy
+    if isinstance(learner, PPO):
+        layers, head, squash = policy.mlp_extractor.policy_net, policy.action_net, "clip"
+    else:
+        layers, head, squash = policy.actor.latent_pi, policy.actor.mu, "tanh"
+    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
+    actor = Actor(linear[0].in_features, settings.hidden, head.out_features, "tanh" if squash == "tanh" else "clip")
+    for ours, theirs in zip([*actor.layers, actor.head], [*linear, head], strict=True):
+        ours.load_state_dict({name: tensor.clone() for name, tensor in theirs.state_dict().items()})
+    return actor
+
+
+class Watcher(BaseCallback):
+    """Validates at even intervals, keeps checkpoints and the best policy, and tells how far training is."""
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: PPOSettings | SACSettings,
+        describe: Callable[[int], PolicyDescription],
+        validation: CasterTrackVectorEnv,
+        report: Report,
+    ) -> None:
+        super().__init__()
+        self.folder, self.settings, self.describe, self.validation = folder, settings, describe, validation
+        self.report = report
+        self.history: list[Validation] = []
+        self.best: Validation | None = None
+        self.spent = 0.0
+        self.started = time.perf_counter()
+        self._due = settings.steps / settings.validations
+
+    def _on_step(self) -> bool:
+        if isinstance(self.model, SAC):
+            self._watch()
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if not isinstance(self.model, SAC):
+            self._watch()
+
+    def _watch(self) -> None:
+        if self.num_timesteps >= self._due:
+            self._due += self.settings.steps / self.settings.validations
+            self.validate()
+        self.report(self.num_timesteps, self.history[-1].position_rmse if self.history else float("nan"))
+
+    def validate(self) -> None:
+        """Try the present policy on the validation paths, keep it, and keep it as the best one if it is."""
+        begun = time.perf_counter()
+        bundle = Bundle(self.describe(self.num_timesteps), actor_of(self.model, self.settings))
+        driven = [self.validation.robot.joints.index(joint) for joint in self.validation.robot.driven]
+        metrics = measure(roll_out(bundle.agent, self.validation, VALIDATION_SEED), SETTLING, driven)
+        steady = np.isfinite(metrics.position_rmse)
+        result = Validation(
+            self.num_timesteps,
+            begun - self.started - self.spent,
+            _overall(metrics.position_rmse[steady]),
+            float(metrics.worst_position[steady].max()) if steady.any() else float("inf"),
+            _overall(metrics.heading_rmse[steady]),
+            int(metrics.failed.sum()),
+            float(np.nanmean(metrics.reward)),
+        )
+        self.history.append(result)
+        for name, value in result._asdict().items():
+            self.logger.record(f"validation/{name}", value)
+        save_bundle(self.folder / "checkpoints" / f"{self.num_timesteps:010d}", bundle)
+        if self.best is None or result.merit > self.best.merit:
+            self.best = result
+            save_bundle(self.folder / "best", bundle)
+        self._write_history()
+        self.spent += time.perf_counter() - begun
+
+    def _write_history(self) -> None:
+        with (self.folder / "validation.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(Validation._fields)
+            writer.writerows(self.history)
+
+
+def _overall(rmse: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(rmse)))) if rmse.size else float("inf")
+
+
+def train(
+    task: TaskSettings, settings: PPOSettings | SACSettings, seed: int, folder: Path, report: Report, threads: int = 2
+) -> Validation:
+    """Train a policy into a folder: best/ and checkpoints/ as bundles, validation.csv, progress.csv, TensorBoard, run.yaml.
+
+    Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
+    """
+    torch.set_num_threads(threads)
+    environment = CasterVecEnv(training_batch(task, settings.robots))
+    validation = test_batch(task, task.validation, starts=1)
+    facts = {"settings": settings.model_dump(mode="json"), "seed": seed}
+
+    def describe(steps: int) -> PolicyDescription:
+        return PolicyDescription(
+            format=1,
+            name=settings.algorithm.upper(),
+            squash="clip" if isinstance(settings, PPOSettings) else "tanh",
+            hidden=settings.hidden,
+            robot=validation.robot,
+            task=task.task,
+            trained_with={**facts, "steps": steps},
+            versions=versions(),
+        )
+
+    folder.mkdir(parents=True, exist_ok=True)
+    learner = make_learner(settings, environment, seed)
+    learner.set_logger(configure(str(folder), ["csv", "tensorboard"]))
+    watcher = Watcher(folder, settings, describe, validation, report)
+    completed = False
+    try:
+        learner.learn(settings.steps, callback=watcher)
+        completed = True
+    finally:
+        watcher.validate()
+        history = [result._asdict() for result in watcher.history]
+        write_provenance(
+            folder,
+            task=task.model_dump(mode="json"),
+            agent=settings.model_dump(mode="json"),
+            seed=seed,
+            threads=threads,
+            completed=completed,
+            seconds=watcher.history[-1].seconds,
+            validations=history,
+        )
+        learner.logger.close()
+    assert watcher.best is not None  # validate() has just run
+    return watcher.best
