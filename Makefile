@@ -20,7 +20,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@touch $@
 
 benchmark: $(INSTALLED) ## Learned and model-based control compared; results in runs/benchmark
-	$(BIN)/caster-gym benchmark --config track --out runs/benchmark
+	$(BIN)/caster-gym benchmark --config track --out runs/benchmark --overwrite
 
 test: lint ## Lint, then all tests
 	$(BIN)/python -m pytest
@@ -28,7 +28,7 @@ test: lint ## Lint, then all tests
 lint: $(INSTALLED) ## Style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy --strict -p caster_gym
+	$(BIN)/mypy
 
 format: $(INSTALLED) ## Bring the sources into shape
 	$(BIN)/ruff check --fix

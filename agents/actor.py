@@ -1,6 +1,7 @@
 """The deterministic part of a learned policy: a small network from observation to action."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ class Actor(nn.Module):
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, squash: Squash) -> None:
         super().__init__()
         widths = [inputs, *hidden]
-        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths[:-1], widths[1:], strict=True))
+        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(widths))
         self.head = nn.Linear(widths[-1], outputs)
         self.squash = squash
 

@@ -1,10 +1,9 @@
 """A policy on disk: a folder with weights as safetensors and everything else as YAML. Loading it runs no code.
 
-    policy.yaml            what the policy is, for which robot and task, and how it came about
-    weights.safetensors    the actor's weights
+policy.yaml            what the policy is, for which robot and task, and how it came about
+weights.safetensors    the actor's weights
 """
 
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -17,11 +16,12 @@ from pydantic import PositiveInt
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
-from caster_gym.agents.actor import Actor, LearnedAgent, Squash
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import Robot
+
+from .actor import Actor, LearnedAgent, Squash
 
 FORMAT = 1
 DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
@@ -76,8 +76,8 @@ def save_bundle(folder: Path, bundle: Bundle) -> None:
         fresh.chmod(0o755)
         old = fresh.with_name(fresh.name + "-old")
         if folder.exists():
-            os.replace(folder, old)
-        os.replace(fresh, folder)
+            folder.replace(old)
+        fresh.replace(folder)
         shutil.rmtree(old, ignore_errors=True)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
@@ -91,9 +91,7 @@ def load_bundle(folder: Path) -> Bundle:
             f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
         )
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
-    actor = Actor(
-        description.layout.size, description.hidden, len(description.robot.driven), description.squash
-    )
+    actor = Actor(description.layout.size, description.hidden, len(description.robot.driven), description.squash)
     _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
     return Bundle(description, actor)
 

@@ -12,12 +12,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.agents.torque_distribution import distribute
 from caster_gym.analysis.actuation import warn_if_singular
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.robot import Robot
+
+from .torque_distribution import distribute
 
 Array = NDArray[np.float64]
 KnownModel = Literal["exact", "without D1", "without wheels"]
@@ -108,7 +109,7 @@ class ComputedTorque:
         return wanted
 
     def _mean_acceleration(self, observations: NDArray[np.float32], velocity: Array) -> Array:
-        """Reference acceleration (robots, 3) in the middle of the coming period, with the jerk that the preview shows."""
+        """Reference acceleration (robots, 3) in the middle of the coming period; the preview shows its jerk."""
         now = self.layout.physical(observations, "reference_acceleration")
         if not self.layout.preview:
             return now

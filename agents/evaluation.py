@@ -1,14 +1,15 @@
 """Episodes of an agent on given paths and starts, and what they measure."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from caster_gym.agents.protocol import Agent
-from caster_gym.agents.settings import Paths, TaskSettings
 from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+
+from .protocol import Agent
+from .settings import Paths, TaskSettings
 
 Array = NDArray[np.float64]
 SATURATED = 0.999  # commands from here on count as saturated, and torques that differ from theirs by the rest
@@ -62,7 +63,7 @@ def training_batch(settings: TaskSettings, robots: int) -> CasterTrackVectorEnv:
     )
 
 
-def _fields(settings: TaskSettings) -> dict[str, object]:
+def _fields(settings: TaskSettings) -> dict[str, Any]:
     return settings.task.model_dump()
 
 
@@ -78,12 +79,11 @@ def roll_out(agent: Agent, batch: CasterTrackVectorEnv, seed: int) -> Episodes:
     while running.any():
         actions = agent.act(observations)
         observations, rewards, terminated, truncated, info = batch.step(actions)
-        torque = info["torque"]
         row = (
             info["position_error"],
             info["heading_error"],
-            torque,
-            torque / limits,
+            info["torque"],
+            info["torque"] / limits,
             actions,
             info["pose"],
             info["reference_pose"],
@@ -92,9 +92,12 @@ def roll_out(agent: Agent, batch: CasterTrackVectorEnv, seed: int) -> Episodes:
         rows.append(tuple(np.where(running.reshape(-1, *[1] * (x.ndim - 1)), x, np.nan) for x in row))
         failed |= running & terminated
         running &= ~(terminated | truncated)
-    series = [np.stack(column) for column in zip(*rows, strict=True)]
+    position, heading, torque, share, command, pose, reference, reward = (
+        np.stack(column) for column in zip(*rows, strict=True)
+    )
     names = tuple(trajectories[i].name for i in index)
-    return Episodes(names, batch.task.control_period, *series, failed=failed)
+    period = batch.task.control_period
+    return Episodes(names, period, position, heading, torque, share, command, pose, reference, reward, failed)
 
 
 def measure(episodes: Episodes, settling: float, driven: list[int]) -> Metrics:

@@ -7,10 +7,11 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, model_validator
 
-from caster_gym.agents.computed_torque import KnownModel
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.paths.specification import PathSpecification
+
+from .computed_torque import KnownModel
 
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
@@ -139,7 +140,9 @@ def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
     return parse(model, read_yaml(path), str(path))
 
 
-def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> PPOSettings | SACSettings | ComputedTorqueSettings:
+def read_agent(
+    name: str, changes: Mapping[str, Any] | None = None
+) -> PPOSettings | SACSettings | ComputedTorqueSettings:
     """Checked settings of an agent, with some fields changed."""
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}

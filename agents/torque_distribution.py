@@ -4,8 +4,8 @@
     B       wrench at C of each motor at its greatest torque, moments divided by a length L    [N]
     F       wanted wrench, its moment divided by L                 [N]
 
-minimise |B u − F|² + λ |u|² subject to low <= u <= high. Without active limits this is the damped pseudo-inverse, solved
-for all robots at once; the others are quadratic programs of daqp (Arnström, Bemporad and Axehill, IEEE TAC 67, 2022).
+minimise |B u − F|² + λ |u|² subject to low <= u <= high. Without active limits this is the damped pseudo-inverse,
+solved for all robots at once; the others are quadratic programs of daqp (Arnström, Bemporad and Axehill, IEEE TAC 67, 2022).
 """
 
 from typing import Any
@@ -25,8 +25,8 @@ def distribute(b: Array, wrench: Array, low: Array, high: Array) -> Array:
     damping = damping_of(b)
     gram = b @ b.mT + damping[:, None, None] * np.eye(3)
     free = (b.mT @ np.linalg.solve(gram, wrench[..., None]))[..., 0]
-    shares = np.clip(free, low, high)
-    for robot in np.flatnonzero((shares != free).any(axis=1)):
+    shares: Array = np.clip(free, low, high)
+    for robot in np.flatnonzero(np.any(shares != free, axis=1)):
         shares[robot] = bounded_least_squares(b[robot], wrench[robot], low[robot], high[robot], damping[robot])
     return shares
 
@@ -36,8 +36,8 @@ def damping_of(b: Array) -> Array:
     singular = np.linalg.svd(b, compute_uv=False)
     greatest = np.maximum(singular[:, 0], 1e-12)
     nearness = 1.0 - np.minimum(singular[:, -1] / greatest / WELL_CONDITIONED, 1.0)
-    share: Array = (STRONGEST_DAMPING * nearness) ** 2 + REGULARISATION**2
-    return share * greatest**2
+    damping: Array = ((STRONGEST_DAMPING * nearness) ** 2 + REGULARISATION**2) * greatest**2
+    return damping
 
 
 def bounded_least_squares(b: Array, wrench: Array, low: Array, high: Array, damping: float) -> Array:

@@ -17,13 +17,14 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from caster_gym.agents.actor import Actor
-from caster_gym.agents.bundle import Bundle, PolicyDescription, save_bundle
-from caster_gym.agents.evaluation import measure, roll_out, test_batch, training_batch
-from caster_gym.agents.provenance import versions, write_provenance
-from caster_gym.agents.sb3_environment import CasterVecEnv
-from caster_gym.agents.settings import Learner, PPOSettings, SACSettings, TaskSettings
 from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+
+from .actor import Actor
+from .bundle import Bundle, PolicyDescription, save_bundle
+from .evaluation import measure, roll_out, test_batch, training_batch
+from .provenance import versions, write_provenance
+from .sb3_environment import CasterVecEnv
+from .settings import Learner, PPOSettings, SACSettings, TaskSettings
 
 VALIDATION_SEED = 500
 SETTLING = 2.0  # [s]
@@ -174,7 +175,7 @@ def _overall(rmse: np.ndarray) -> float:
 def train(
     task: TaskSettings, settings: PPOSettings | SACSettings, seed: int, folder: Path, report: Report, threads: int = 2
 ) -> Validation:
-    """Train a policy into a folder: best/ and checkpoints/ as bundles, validation.csv, progress.csv, TensorBoard, run.yaml.
+    """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
     Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
     """

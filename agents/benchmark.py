@@ -1,0 +1,190 @@
+"""The comparison: every agent on the same held-out paths, starts, sensors, preview and limits."""
+
+import multiprocessing
+import os
+import queue
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tqdm import tqdm
+
+from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+
+from .bundle import load_bundle
+from .computed_torque import ComputedTorque
+from .evaluation import Episodes, measure, roll_out, test_batch
+from .figures import write_figures
+from .protocol import Agent
+from .provenance import write_provenance
+from .settings import (
+    BenchmarkSettings,
+    ComputedTorqueSettings,
+    PPOSettings,
+    SACSettings,
+    TaskSettings,
+    read_agent,
+    read_settings,
+)
+from .summary import Result, table, write_episodes, write_summary
+from .training import VALIDATION_SEED, Validation, train
+
+
+class Job(NamedTuple):
+    """One training run."""
+
+    name: str
+    task: TaskSettings
+    agent: PPOSettings | SACSettings
+    seed: int
+    folder: Path
+
+
+class Contender(NamedTuple):
+    """An agent that is ready to be compared."""
+
+    agent: Agent
+    seed: int | None
+
+
+def run_benchmark(settings: BenchmarkSettings, folder: Path, changes: Mapping[str, Any] | None = None) -> str:
+    """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
+
+    The folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures. changes: fields of learned
+    agents to set, for instance {"steps": 10000}.
+    """
+    task = read_settings(TaskSettings, "tasks", settings.task)
+    agents = {name: read_agent(name) for name in dict.fromkeys(settings.agents)}
+    agents = {
+        name: agent if isinstance(agent, ComputedTorqueSettings) else read_agent(name, changes)
+        for name, agent in agents.items()
+    }
+    jobs = [
+        Job(f"{name} seed {seed}", task, agent, seed, folder / "policies" / f"{name}-{seed}")
+        for name, agent in agents.items()
+        if not isinstance(agent, ComputedTorqueSettings)
+        for seed in settings.seeds
+    ]
+    test = test_batch(task, task.test, settings.starts)
+    validation = test_batch(task, task.validation, starts=1)
+    test.reset(seed=settings.start_seed)
+    test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
+
+    model_based = {
+        name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ComputedTorqueSettings)
+    }
+    train_all(jobs)
+    contenders: list[Contender] = []
+    for name, agent in agents.items():
+        if name in model_based:
+            contenders.append(Contender(model_based[name][0], None))
+        contenders += [
+            Contender(load_bundle(job.folder / "best").agent, job.seed) for job in jobs if job.agent is agent
+        ]
+    results, episodes = compare(contenders, test, settings)
+
+    text = table(results, settings.confidence)
+    write_episodes(folder / "episodes.csv", results)
+    write_summary(folder / "summary.csv", results, settings.confidence)
+    (folder / "table.md").write_text(text + "\n", encoding="utf-8")
+    write_figures(folder, episodes, {job.name: read_history(job.folder) for job in jobs})
+    write_provenance(
+        folder,
+        benchmark=settings.model_dump(mode="json"),
+        task=task.model_dump(mode="json"),
+        agents={name: agent.model_dump(mode="json") for name, agent in agents.items()},
+        natural_frequencies={name: frequency for name, (_, frequency) in model_based.items()},
+        robot=test.robot.model_dump(mode="json"),
+    )
+    return text
+
+
+def compare(
+    contenders: Sequence[Contender], test: CasterTrackVectorEnv, settings: BenchmarkSettings
+) -> tuple[list[Result], dict[str, Episodes]]:
+    """Results of all contenders on the same episodes, and the time series of each agent's first seed."""
+    driven = [test.robot.joints.index(joint) for joint in test.robot.driven]
+    results: list[Result] = []
+    shown: dict[str, Episodes] = {}
+    for agent, seed in tqdm(contenders, desc="evaluating", unit="agent"):
+        episodes = roll_out(agent, test, settings.start_seed)
+        shown.setdefault(agent.name, episodes)
+        results.append(Result(agent.name, seed, episodes.names, measure(episodes, settings.settling, driven)))
+    return results, shown
+
+
+def tune(settings: ComputedTorqueSettings, validation: CasterTrackVectorEnv) -> tuple[ComputedTorque, float]:
+    """The controller whose natural frequency [rad/s] does best on validation paths, as policies are chosen there."""
+    driven = [validation.robot.joints.index(joint) for joint in validation.robot.driven]
+    best: tuple[tuple[float, float], ComputedTorque, float] | None = None
+    for frequency in settings.natural_frequencies:
+        agent = ComputedTorque(validation.engine.layout, frequency, validation.task.control_period, settings.known)
+        metrics = measure(
+            roll_out(agent, validation, VALIDATION_SEED), BenchmarkSettings.model_fields["settling"].default, driven
+        )
+        merit = (float(metrics.failed.sum()), float(metrics.position_rmse[metrics.failed == 0].mean()))
+        if best is None or merit < best[0]:
+            best = (merit, agent, frequency)
+    assert best is not None  # there is at least one natural frequency
+    return best[1], best[2]
+
+
+def train_all(jobs: Sequence[Job]) -> None:
+    """Train all jobs, one per core at a time, with one progress bar over all their steps.
+
+    Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised.
+    """
+    if not jobs:
+        return
+    cores = os.cpu_count() or 1
+    workers = min(len(jobs), cores)
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as manager, _bar(jobs) as show:
+        reports = manager.Queue()
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            futures = [pool.submit(_train_job, i, job, cores // workers, reports) for i, job in enumerate(jobs)]
+            try:
+                while not all(future.done() for future in futures):
+                    _raise_errors(futures)
+                    try:
+                        show(*reports.get(timeout=0.5))
+                    except queue.Empty:
+                        continue
+                _raise_errors(futures)
+            except BaseException:
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+
+
+def _raise_errors(futures: Sequence["Future[None]"]) -> None:
+    for future in futures:
+        if future.done():
+            future.result()
+
+
+@contextmanager
+def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, float], None]]:
+    done = [0] * len(jobs)
+    with tqdm(total=sum(job.agent.steps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
+
+        def show(job: int, steps: int, error: float) -> None:
+            done[job] = min(steps, jobs[job].agent.steps)
+            bar.n = sum(done)
+            if error == error:
+                bar.set_postfix_str(f"{jobs[job].name}: {1e3 * error:.2f} mm", refresh=False)
+            bar.refresh()
+
+        yield show
+
+
+def _train_job(index: int, job: Job, threads: int, reports: Any) -> None:
+    train(job.task, job.agent, job.seed, job.folder, lambda steps, error: reports.put((index, steps, error)), threads)
+
+
+def read_history(folder: Path) -> list[Validation]:
+    """The validations of a training run."""
+    lines = (folder / "validation.csv").read_text(encoding="utf-8").splitlines()[1:]
+    rows = [[float(cell) for cell in line.split(",")] for line in lines]
+    return [Validation(int(r[0]), r[1], r[2], r[3], r[4], int(r[5]), r[6]) for r in rows]

@@ -1,0 +1,161 @@
+"""The command caster-gym: train, evaluate, benchmark."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from tqdm import tqdm
+
+from .settings import (
+    BenchmarkSettings,
+    ComputedTorqueSettings,
+    TaskSettings,
+    read_agent,
+    read_settings,
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
+)
+
+Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change a setting of the learned agents, e.g. --set steps=100000. May be repeated."),
+]
+TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
+
+
+@app.command()
+def train(
+    agent: Annotated[str, typer.Argument(help="Name of an agent in configs/agents, or path of a YAML file.")] = "ppo",
+    task: TaskName = "track",
+    seed: Annotated[int, typer.Option(help="Seed of networks, exploration and training paths.")] = 0,
+    out: Out = Path("runs/train"),
+    overwrite: Overwrite = False,
+    change: Changes = None,
+) -> None:
+    """Train a policy; the best one on validation paths is OUT/best, a folder that `evaluate` reads."""
+    with _plain_errors():
+        from .training import train as run
+
+        settings = read_agent(agent, _parsed(change))
+        if isinstance(settings, ComputedTorqueSettings):
+            raise ValueError(f"agent {agent!r} does not learn; compare it with `caster-gym benchmark`")
+        tasks = read_settings(TaskSettings, "tasks", task)
+        _prepare(out, overwrite)
+        with tqdm(total=settings.steps, desc=f"{agent} seed {seed}", unit="step", unit_scale=True) as bar:
+
+            def report(steps: int, error: float) -> None:
+                bar.n = min(steps, settings.steps)
+                if error == error:
+                    bar.set_postfix_str(f"validation {1e3 * error:.2f} mm", refresh=False)
+                bar.refresh()
+
+            best = run(tasks, settings, seed, out, report)
+        typer.echo(
+            f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: position RMSE "
+            f"{1e3 * best.position_rmse:.2f} mm, {best.failures} failures. It is in {out / 'best'}."
+        )
+
+
+@app.command()
+def evaluate(
+    policy: Annotated[str, typer.Argument(help="Folder of a trained policy, or name of a model-based agent.")],
+    task: TaskName = "track",
+    starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
+    out: Out = Path("runs/evaluate"),
+    overwrite: Overwrite = False,
+) -> None:
+    """Try an agent on the test paths of a task: a table, every episode as CSV, and figures."""
+    with _plain_errors():
+        from .benchmark import Contender, compare, tune
+        from .bundle import load_bundle
+        from .evaluation import test_batch
+        from .figures import write_figures
+        from .provenance import write_provenance
+        from .summary import table, write_episodes, write_summary
+
+        tasks = read_settings(TaskSettings, "tasks", task)
+        settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
+        test = test_batch(tasks, tasks.test, starts)
+        if Path(policy).is_dir():
+            bundle = load_bundle(Path(policy))
+            bundle.check_fits(test.engine.layout)
+            contender = Contender(bundle.agent, None)
+        else:
+            known = read_agent(policy)
+            if not isinstance(known, ComputedTorqueSettings):
+                raise ValueError(f"agent {policy!r} must be trained first: give the folder of its policy")
+            contender = Contender(tune(known, test_batch(tasks, tasks.validation, starts=1))[0], None)
+        _prepare(out, overwrite)
+        results, episodes = compare([contender], test, settings)
+        text = table(results, settings.confidence)
+        write_episodes(out / "episodes.csv", results)
+        write_summary(out / "summary.csv", results, settings.confidence)
+        (out / "table.md").write_text(text + "\n", encoding="utf-8")
+        write_figures(out, episodes, {})
+        write_provenance(out, policy=policy, task=tasks.model_dump(mode="json"), starts=starts)
+        typer.echo(text)
+        typer.echo(f"Results and figures are in {out}.")
+
+
+@app.command()
+def benchmark(
+    config: Annotated[str, typer.Option(help="Name of a comparison in configs/benchmarks, or a YAML file.")] = "track",
+    out: Out = Path("runs/benchmark"),
+    overwrite: Overwrite = False,
+    change: Changes = None,
+) -> None:
+    """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
+    with _plain_errors():
+        from .benchmark import run_benchmark
+
+        settings = read_settings(BenchmarkSettings, "benchmarks", config)
+        _prepare(out, overwrite)
+        typer.echo(run_benchmark(settings, out, _parsed(change)))
+        typer.echo(f"Results, policies and figures are in {out}.")
+
+
+def _parsed(changes: list[str] | None) -> dict[str, Any]:
+    """Settings from KEY=VALUE, values read as YAML."""
+    parsed = {}
+    for change in changes or []:
+        key, equals, value = change.partition("=")
+        if not equals or not key:
+            raise ValueError(f"--set needs KEY=VALUE, got {change!r}")
+        parsed[key] = yaml.safe_load(value)
+    return parsed
+
+
+def _prepare(folder: Path, overwrite: bool) -> None:
+    """An empty folder; refuses to touch one that holds something, unless told to."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        if not overwrite:
+            raise ValueError(f"{folder} is not empty; choose another --out, or --overwrite it")
+        shutil.rmtree(folder) if folder.is_dir() else folder.unlink()
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+@contextmanager
+def _plain_errors() -> Iterator[None]:
+    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C."""
+    try:
+        yield
+    except ValueError as error:
+        typer.echo(f"caster-gym: {error}", err=True)
+        raise typer.Exit(2) from error
+    except KeyboardInterrupt:
+        typer.echo("caster-gym: interrupted; what was finished is kept", err=True)
+        raise typer.Exit(130) from None
+
+
+if __name__ == "__main__":
+    app()

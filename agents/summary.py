@@ -1,0 +1,128 @@
+"""From episodes to tables: means with bootstrap intervals, as CSV and as text to read."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import bootstrap
+
+from .evaluation import Metrics
+
+Array = NDArray[np.float64]
+RESAMPLES = 2000
+
+
+class Result(NamedTuple):
+    """What one agent, trained with one seed or with none, did on all test episodes."""
+
+    agent: str
+    seed: int | None
+    paths: tuple[str, ...]  # name of the path of each episode
+    metrics: Metrics
+
+
+class Column(NamedTuple):
+    """A column of the printed table: a metric in a readable unit."""
+
+    metric: str
+    title: str
+    factor: float
+
+
+COLUMNS = (
+    Column("position_rmse", "position RMSE [mm]", 1e3),
+    Column("heading_rmse", "heading RMSE [mrad]", 1e3),
+    Column("worst_position", "worst error [mm]", 1e3),
+    Column("position_rmse_transient", "transient RMSE [mm]", 1e3),
+    Column("heading_rmse_transient", "transient heading [mrad]", 1e3),
+    Column("effort", "effort [%]", 1e2),
+    Column("peak_torque", "peak torque [N m]", 1.0),
+    Column("torque_variation", "torque variation [1/s]", 1.0),
+    Column("saturation", "saturated [%]", 1e2),
+)
+
+
+class Estimate(NamedTuple):
+    """Mean over episodes with its bootstrap interval, and the lowest and highest mean of a seed."""
+
+    mean: float
+    low: float
+    high: float
+    seed_low: float
+    seed_high: float
+
+
+def estimate(values: Array, confidence: float) -> Estimate:
+    """Estimate from values (seeds, episodes).
+
+    Episodes are resampled, each with all its seeds together (percentile bootstrap of the mean, scipy.stats.bootstrap),
+    so that the interval speaks of other paths and starts; the spread over seeds is given apart. Missing values (NaN)
+    are left out.
+    """
+    with_value = np.isfinite(values)
+    per_seed = np.where(with_value, values, 0.0).sum(axis=1) / np.maximum(with_value.sum(axis=1), 1)
+    counts = with_value.sum(axis=0)
+    episodes = (np.where(with_value, values, 0.0).sum(axis=0) / np.maximum(counts, 1))[counts > 0]
+    if episodes.size == 0:
+        return Estimate(*[float("nan")] * 5)
+    mean = float(episodes.mean())
+    if episodes.size < 2 or np.ptp(episodes) == 0.0:
+        return Estimate(mean, mean, mean, float(per_seed.min()), float(per_seed.max()))
+    interval = bootstrap(
+        (episodes,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, method="percentile", rng=0
+    ).confidence_interval
+    return Estimate(mean, float(interval.low), float(interval.high), float(per_seed.min()), float(per_seed.max()))
+
+
+def by_agent(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Results of each agent, in the order in which agents first appear."""
+    groups: dict[str, list[Result]] = {}
+    for result in results:
+        groups.setdefault(result.agent, []).append(result)
+    return groups
+
+
+def values_of(results: Sequence[Result], metric: str) -> Array:
+    """A metric of several results of the same episodes (seeds, episodes)."""
+    return np.stack([getattr(result.metrics, metric) for result in results])
+
+
+def table(results: Sequence[Result], confidence: float) -> str:
+    """Markdown table with a row for each agent: mean and interval, then seeds' range where there are seeds."""
+    titles = ["agent", *[column.title for column in COLUMNS], "failures"]
+    lines = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
+    for agent, group in by_agent(results).items():
+        cells = [agent if group[0].seed is None else f"{agent}, {len(group)} seed{'s' * (len(group) > 1)}"]
+        for column in COLUMNS:
+            found = estimate(values_of(group, column.metric) * column.factor, confidence)
+            cell = f"{found.mean:.3g} [{found.low:.3g}, {found.high:.3g}]"
+            cells.append(cell if len(group) < 2 else f"{cell}, seeds {found.seed_low:.3g} … {found.seed_high:.3g}")
+        failed = values_of(group, "failed")
+        cells.append(f"{int(failed.sum())} of {failed.size}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def write_episodes(path: Path, results: Sequence[Result]) -> None:
+    """Every metric of every episode of every agent and seed, in SI units."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["agent", "seed", "episode", "path", *Metrics._fields])
+        for result in results:
+            seed = "" if result.seed is None else result.seed
+            for i, name in enumerate(result.paths):
+                writer.writerow([result.agent, seed, i, name, *[float(values[i]) for values in result.metrics]])
+
+
+def write_summary(path: Path, results: Sequence[Result], confidence: float) -> None:
+    """The table's numbers for every metric, in SI units."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["agent", "seeds", "episodes", "metric", *Estimate._fields])
+        for agent, group in by_agent(results).items():
+            for metric in Metrics._fields:
+                found = estimate(values_of(group, metric), confidence)
+                writer.writerow([agent, len(group), len(group[0].paths), metric, *found])
