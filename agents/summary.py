@@ -24,24 +24,24 @@ class Result(NamedTuple):
     metrics: Metrics
 
 
-class Column(NamedTuple):
-    """A column of the printed table: a metric in a readable unit."""
+class Row(NamedTuple):
+    """A row of the printed table: a metric in a readable unit."""
 
     metric: str
     title: str
     factor: float
 
 
-COLUMNS = (
-    Column("position_rmse", "position RMSE [mm]", 1e3),
-    Column("heading_rmse", "heading RMSE [mrad]", 1e3),
-    Column("worst_position", "worst error [mm]", 1e3),
-    Column("position_rmse_transient", "transient RMSE [mm]", 1e3),
-    Column("heading_rmse_transient", "transient heading [mrad]", 1e3),
-    Column("effort", "effort [%]", 1e2),
-    Column("peak_torque", "peak torque [N m]", 1.0),
-    Column("torque_variation", "torque variation [1/s]", 1.0),
-    Column("saturation", "saturated [%]", 1e2),
+ROWS = (
+    Row("position_rmse", "position RMSE [mm]", 1e3),
+    Row("heading_rmse", "heading RMSE [mrad]", 1e3),
+    Row("worst_position", "worst position error [mm]", 1e3),
+    Row("position_rmse_transient", "position RMSE, transient [mm]", 1e3),
+    Row("heading_rmse_transient", "heading RMSE, transient [mrad]", 1e3),
+    Row("effort", "effort [% of limits squared]", 1e2),
+    Row("peak_torque", "peak torque [N m]", 1.0),
+    Row("torque_variation", "torque variation [1/s]", 1.0),
+    Row("saturation", "saturated [%]", 1e2),
 )
 
 
@@ -91,19 +91,25 @@ def values_of(results: Sequence[Result], metric: str) -> Array:
 
 
 def table(results: Sequence[Result], confidence: float) -> str:
-    """Markdown table with a row for each agent: mean and interval, then seeds' range where there are seeds."""
-    titles = ["agent", *[column.title for column in COLUMNS], "failures"]
-    lines = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
-    for agent, group in by_agent(results).items():
-        cells = [agent if group[0].seed is None else f"{agent}, {len(group)} seed{'s' * (len(group) > 1)}"]
-        for column in COLUMNS:
-            found = estimate(values_of(group, column.metric) * column.factor, confidence)
-            cell = f"{found.mean:.3g} [{found.low:.3g}, {found.high:.3g}]"
-            cells.append(cell if len(group) < 2 else f"{cell}, seeds {found.seed_low:.3g} … {found.seed_high:.3g}")
-        failed = values_of(group, "failed")
-        cells.append(f"{int(failed.sum())} of {failed.size}")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    """Markdown table with a column for each agent: mean and interval, then the range of the seeds' means."""
+    groups = by_agent(results)
+    head = [
+        "",
+        *[name if g[0].seed is None else f"{name}, {len(g)} seed{'s' * (len(g) > 1)}" for name, g in groups.items()],
+    ]
+    body = [[row.title, *[_cell(g, row, confidence) for g in groups.values()]] for row in ROWS]
+    failed = [values_of(g, "failed") for g in groups.values()]
+    body.append(["failures", *[f"{int(f.sum())} of {f.size}" for f in failed]])
+    widths = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
+    lines = [[cell.ljust(width) for cell, width in zip(line, widths, strict=True)] for line in [head, *body]]
+    rule = ["-" * width for width in widths]
+    return "\n".join("| " + " | ".join(line) + " |" for line in [lines[0], rule, *lines[1:]])
+
+
+def _cell(group: Sequence[Result], row: Row, confidence: float) -> str:
+    found = estimate(values_of(group, row.metric) * row.factor, confidence)
+    cell = f"{found.mean:.3g} [{found.low:.3g}, {found.high:.3g}]"
+    return cell if len(group) < 2 else f"{cell}, seeds {found.seed_low:.3g} … {found.seed_high:.3g}"
 
 
 def write_episodes(path: Path, results: Sequence[Result]) -> None:

@@ -5,7 +5,8 @@
     F       wanted wrench, its moment divided by L                 [N]
 
 minimise |B u − F|² + λ |u|² subject to low <= u <= high. Without active limits this is the damped pseudo-inverse,
-solved for all robots at once; the others are quadratic programs of daqp (Arnström, Bemporad and Axehill, IEEE TAC 67, 2022).
+solved for all robots at once; the others are quadratic programs of daqp (Arnström, Bemporad and Axehill, IEEE
+Transactions on Automatic Control 67, 2022).
 """
 
 from typing import Any

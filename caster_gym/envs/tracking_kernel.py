@@ -1,8 +1,8 @@
 """The compiled step of the tracking task: how its quantities lie in a block, and the loops over the block's robots.
 
-Rows of a block: state, motor commands, mean motor torques, mean power, reference, preview, observation, report, weights,
-robot parameters. `casters` and `preview` are any tuples with an item per caster and per previewed point: their lengths
-are part of their types, so that all rows are constants of the compiled code.
+Rows of a block: state, motor commands, mean motor torques, mean power, reference, preview, observation, report,
+weights, robot parameters. `casters` and `preview` are any tuples with an item per caster and per previewed point:
+their lengths are part of their types, so that all rows are constants of the compiled code.
 """
 
 import math
@@ -185,8 +185,10 @@ def _deliver(block: Any, lane: Any, robot: Any, views: Views, casters: Any, prev
 
 
 @register_jitable(**INLINE)
-def _step_lanes(i: Any, lanes: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    """One control period of the robots of block i."""
+def _step_lanes(
+    i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any
+) -> None:
+    """One control period of the robots of block i, of which `look` observes as many as there are lanes."""
     block = world.blocks[i]
     first = i * LANES
     here = min(lanes, len(actions) - first)
@@ -200,7 +202,7 @@ def _step_lanes(i: Any, lanes: Any, world: World, actions: Any, views: Views, ca
     for lane in range(here):
         world.clocks[0, first + lane] += 1
         _fetch(block, lane, first + lane, world, casters)
-    _look(block, 0, lanes, casters, preview)
+    look(block, casters, preview)
     for lane in range(here):
         robot = first + lane
         _deliver(block, lane, robot, views, casters, preview)
@@ -212,12 +214,26 @@ def _step_lanes(i: Any, lanes: Any, world: World, actions: Any, views: Views, ca
         views.results[2, robot] = 1.0 if world.clocks[0, robot] >= world.spans[world.clocks[1, robot], 2] else 0.0
 
 
+@register_jitable(**INLINE)
+def _look_at_all(block: Any, casters: Any, preview: Any) -> None:
+    _look(block, 0, LANES, casters, preview)
+
+
+@register_jitable(**INLINE)
+def _look_at_first(block: Any, casters: Any, preview: Any) -> None:
+    look_at_one(block, 0, casters, preview)
+
+
+def _look_at_one(block: Any, lane: Any, casters: Any, preview: Any) -> None:
+    _look(block, lane, 1, casters, preview)
+
+
 def _step_block(i: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    _step_lanes(i, LANES, world, actions, views, casters, preview)
+    _step_lanes(i, LANES, _look_at_all, world, actions, views, casters, preview)
 
 
 def _step_single(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    _step_lanes(0, 1, world, actions, views, casters, preview)
+    _step_lanes(0, 1, _look_at_first, world, actions, views, casters, preview)
 
 
 def _step_all(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
@@ -231,14 +247,16 @@ def _random_direction(key: Any, episode: Any, index: Any) -> Any:
     return math.cos(angle), math.sin(angle)
 
 
-def _restart(selected: Any, world: World, spread: Any, views: Views, casters: Any, preview: Any) -> None:
-    """Start new episodes of the selected robots; spread: greatest offset along an axis [m] and turn [rad]."""
-    for robot in selected:
+def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views, casters: Any, preview: Any) -> None:
+    """Start new episodes of the selected robots; wanted: path of each, −1 draws one; spread: greatest offset, turn."""
+    for i in range(len(selected)):
+        robot = selected[i]
         block, lane = world.blocks[robot // LANES], robot % LANES
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
-        world.clocks[1, robot] = int(uniform(key, episode, np.uint64(0)) * len(world.spans))
+        drawn = int(uniform(key, episode, np.uint64(0)) * len(world.spans))
+        world.clocks[1, robot] = drawn if wanted[i] < 0 else wanted[i]
         x = (2.0 * uniform(key, episode, np.uint64(1)) - 1.0) * spread[0]
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
         turn = (2.0 * uniform(key, episode, np.uint64(3)) - 1.0) * spread[1]
@@ -249,10 +267,11 @@ def _restart(selected: Any, world: World, spread: Any, views: Views, casters: An
         write(block, lane, 0, pack_state(state))
         for row in range(command_row(casters), reference_row(casters)):
             block[row * LANES + lane] = 0.0
-        _look(block, lane, 1, casters, preview)
+        look_at_one(block, lane, casters, preview)
         _deliver(block, lane, robot, views, casters, preview)
 
 
+look_at_one = compiled(_look_at_one)
 step_block = compiled(_step_block)
 step_single = compiled(_step_single)
 step_serial = compiled(_step_all)
