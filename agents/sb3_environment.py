@@ -52,7 +52,7 @@ class CasterVecEnv(VecEnv):
         final = infos.get("final_info", {})
         error = np.where(done, final["position_error"], infos["position_error"]) if final else infos["position_error"]
         self._returns += rewards
-        self._errors += error
+        self._errors += np.where(np.isfinite(error), error, self.batch.task.corridor)
         self._lengths += 1
         self.last_infos = infos
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

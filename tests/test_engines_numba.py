@@ -199,7 +199,7 @@ def test_the_slowest_robot_decides_the_time_step():
     """Every robot of the fleet is checked, not only the first."""
     quick = random_robot(230, 3)
     slow = quick.model_copy(update={"casters": tuple(c.model_copy(update={"trail": 1e-4}) for c in quick.casters)})
-    with pytest.raises(ValueError, match="trail of 0.0001 m"):
+    with pytest.raises(ValueError, match=r"trail of 0\.0001 m"):
         Fleet([quick, slow]).step(np.zeros((2, 6)), STEP)
 
 

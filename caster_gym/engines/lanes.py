@@ -35,7 +35,7 @@ def block_count(robots: int) -> int:
 
 
 def to_lanes(rows: NDArray[np.float64], blocks: NDArray[np.float64], first_row: int) -> None:
-    """Put quantities (robots, rows) into blocks (blocks, rows · LANES), from a row on; spare lanes copy the last robot."""
+    """Put quantities (robots, rows) into blocks (blocks, rows · LANES), from a row on; spare lanes copy the last."""
     count, width = rows.shape
     view = blocks.reshape(len(blocks), -1, LANES)[:, first_row : first_row + width]
     padded = np.concatenate([rows, np.repeat(rows[-1:], len(blocks) * LANES - count, axis=0)])

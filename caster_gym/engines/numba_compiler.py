@@ -16,7 +16,6 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 import numba
-from numba.core import config
 from numba.extending import overload, register_jitable
 
 import caster_gym
@@ -33,7 +32,8 @@ from caster_gym.mechanics import (
     scalars,
 )
 
-INLINE = {"forceinline": True}
+INLINE: Any = {"forceinline": True}  # Numba names the type of its options in stubs only
+_SETTINGS: Any = numba.config  # makes its attributes at run time
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
 _LOOPS_AND_CHOICES |= {scalars.flatten, scalars.greatest, scalars.register}
 
@@ -48,19 +48,22 @@ def teach(module: ModuleType) -> None:
 
 def compiled(function: Callable[..., Any], parallel: bool = False) -> Any:
     """The function compiled at its first call, or read from the cache of an earlier process."""
-    with _cache_folder():
+    with _cache_folder(parallel):
         return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=parallel)(function)
 
 
 @contextmanager
-def _cache_folder() -> Iterator[None]:
-    """Numba's cache in a folder of its own for each version of our sources: Numba itself watches one file only."""
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = str(_cache_root(previous) / _source_digest())
+def _cache_folder(parallel: bool) -> Iterator[None]:
+    """Numba's cache in a folder of its own for each version of our sources, and for parallel code.
+
+    Numba itself watches one file only, and takes parallel and serial code of one function for the same.
+    """
+    previous = _SETTINGS.CACHE_DIR
+    _SETTINGS.CACHE_DIR = str(_cache_root(previous) / _source_digest() / ("parallel" if parallel else "serial"))
     try:
         yield
     finally:
-        config.CACHE_DIR = previous
+        _SETTINGS.CACHE_DIR = previous
 
 
 def _cache_root(chosen: str) -> Path:

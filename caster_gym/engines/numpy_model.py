@@ -193,10 +193,10 @@ class Model:
         c, s = self._unit(angle)
         return angle + self._arrays.atan2(f[1] * c - f[0] * s, f[0] * c + f[1] * s)
 
-    def _scalar(self, value: Any) -> Any:
+    def _scalar(self, value: Any) -> Array:
         return np.asarray(value)
 
-    def _stack(self, parts: Any, axis: int = -1) -> Any:
+    def _stack(self, parts: Any, axis: int = -1) -> Array:
         return np.stack(np.broadcast_arrays(*parts), axis)
 
 

@@ -1,13 +1,13 @@
 """CasterTrack-v0: follow a timed trajectory with motor torques."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space
-from caster_gym.envs.tracking_engine import info_of
+from caster_gym.envs.tracking_engine import DRAW_A_PATH, info_of
 
 Observation = NDArray[np.float32]
 
@@ -34,7 +34,7 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     | 10–12 | acceleration of the reference, ahead, left, yaw | B | 2 m/s², 2 m/s², 4 rad/s² | ±20 |
     | 13 … 12+2N | cos δ_i, sin δ_i of each rolling direction | B | 1 | ±1 |
     | 13+2N … 12+4N | rolling rate r θ̇_i and steering rate d δ̇_i | joint | 1 m/s | ±20 |
-    | then 7 for each of K | previewed point: ahead, left; cos, sin of its heading; its vx, vy; its ω | B | 0.5 m; 1; 1 m/s; 2 rad/s | ±20 |
+    | then 7 for each K | its point: ahead, left; cos, sin of heading; vx, vy; ω | B | 0.5 m; 1; 1 m/s; 2 rad/s | ±20 |
 
     **Reward**, the sum of terms that `info["reward_terms"]` names; k(e, ℓ) = ½/(1 + e²/ℓ²) + ½/(1 + e²/(10 ℓ)²):
 
@@ -46,9 +46,9 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     | effort | −0.02 times the mean square of torques as shares of their limits | −0.02 … 0 |
     | alive | 0.02, so that no step is worth less than none | 0.02 |
 
-    **Endings** `terminated`: the robot left its corridor (0.5 m from the reference) or its state stopped being finite, as
-    `info["left_corridor"]` and `info["not_finite"]` tell; all terms of that step are 0. `truncated`: the trajectory is
-    over. Success does not end an episode.
+    **Endings** `terminated`: the robot left its corridor (0.5 m from the reference) or its state stopped being finite,
+    as `info["left_corridor"]` and `info["not_finite"]` tell; all terms of that step are 0. `truncated`: the trajectory
+    is over. Success does not end an episode.
 
     **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad.
 
@@ -57,7 +57,7 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     fields of `caster_gym.envs.track_task.TrackTask`, which holds the numbers above; unknown ones are errors.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # declared so by Gymnasium
 
     def __init__(
         self,
@@ -77,12 +77,13 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode; info as after a step."""
+        """Start an episode; info as after a step. options["path"] chooses a trajectory by its index in the pool."""
+        path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
         super().reset(seed=seed)
         if seed is not None or not self._started:
             self.engine.seed(0, int(self.np_random.integers(2**63)))
             self._started = True
-        outcome = self.engine.restart(_ONLY)
+        outcome = self.engine.restart(_ONLY, path=path)
         return outcome.observations[0], _single(info_of(outcome.reports))
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

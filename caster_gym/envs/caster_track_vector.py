@@ -1,7 +1,7 @@
 """CasterTrack-v0 for many robots at once: one compiled call a step."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -10,13 +10,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space
-from caster_gym.envs.tracking_engine import Outcome, info_of
+from caster_gym.envs.tracking_engine import DRAW_A_PATH, Outcome, info_of
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 
-class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[np.float64]]):
+class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """A batch of `CasterTrackEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
 
     Sub-environment i is seeded with seed + i. All of Gymnasium's autoreset modes are supported; with
@@ -24,7 +24,10 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
     before their trajectory ends. All other arguments are those of `CasterTrackEnv`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata: dict[str, Any] = {  # noqa: RUF012  # declared so by Gymnasium
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -53,22 +56,28 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._started = False
         self._done: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._observations: Observations = np.zeros((num_envs, self.engine.layout.size), dtype=np.float32)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Start episodes of all robots, or of those in options["reset_mask"]."""
+        """Start episodes of all robots, or of those in options["reset_mask"].
+
+        options["path"] chooses trajectories by their index in the pool: one for all, or an array (num_envs,).
+        """
         mask = self._mask(options)
+        path = np.broadcast_to(self.engine.checked_path((options or {}).get("path", DRAW_A_PATH)), self.num_envs)
         selected = np.flatnonzero(mask)
-        for robot, chosen in zip(selected, np.array(self._seeds(seed), dtype=object)[mask], strict=True):
+        for robot, chosen in zip(selected.tolist(), np.array(self._seeds(seed), dtype=object)[mask], strict=True):
             if chosen is not None or self._generators[robot] is None:
                 generator, _ = seeding.np_random(chosen)
                 self._generators[robot] = generator
                 self.engine.seed(robot, int(generator.integers(2**63)))
+        self._started = None not in self._generators
         self._done = self._done & ~mask
-        outcome = self.engine.restart(selected)
+        outcome = self.engine.restart(selected, path=path[mask])
         self._observations = np.where(mask[:, None], outcome.observations, self._observations)
         return self._observations.copy(), _masked(info_of(outcome.reports), mask)
 
@@ -84,8 +93,8 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
             raise ValueError(f"actions must have shape {self.action_space.shape}, got {given.shape}")
         if np.isnan(given).any():
             raise ValueError(f"actions must hold numbers, got {given[np.isnan(given).any(axis=1)][0]}")
-        if self._generators[0] is None:
-            raise RuntimeError("reset the environment before its first step")
+        if not self._started:
+            raise RuntimeError("reset every robot before its first step")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise RuntimeError(f"robot {int(self._done.argmax())} has ended its episode: reset it before the next step")
         outcome = self.engine.step(np.ascontiguousarray(given))

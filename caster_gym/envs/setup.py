@@ -46,11 +46,11 @@ def _trajectories(paths: tuple[PathSpecification, ...], robot: Robot, period: fl
     return build_trajectories(paths, robot, period)
 
 
-def observation_space(engine: TrackingEngine) -> Box:
+def observation_space(engine: TrackingEngine) -> "Box[np.float32]":
     """Space of one robot's observation."""
     return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (engine.layout.size,), np.float32)
 
 
-def action_space(engine: TrackingEngine) -> Box:
+def action_space(engine: TrackingEngine) -> "Box[np.float32]":
     """Space of one robot's action: a share of its greatest torque for each driven motor."""
     return Box(-1.0, 1.0, (len(engine.robot.driven),), np.float32)

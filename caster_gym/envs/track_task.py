@@ -34,7 +34,8 @@ class TrackTask(Frozen):
             steps = horizon / self.control_period
             if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
                 raise ValueError(
-                    f"preview horizons must be multiples of the control period {self.control_period:g} s, got {horizon:g} s"
+                    f"preview horizons must be multiples of the control period {self.control_period:g} s, "
+                    f"got {horizon:g} s"
                 )
         if self.start_offset * 2.0**0.5 >= self.corridor:
             raise ValueError(

@@ -228,7 +228,7 @@ def observe(
 
 
 def greatest_traction(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
-    """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it would slip."""
+    """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it slips."""
     at_joints = each(joint_torques, (), torques, robot.casters)
     v_rate = forward_dynamics(state.twist, state.directions, at_joints, (0.0, 0.0, 0.0), robot)
     forces = each(ground_force, (state.twist, v_rate), state.directions, robot.casters, at_joints)

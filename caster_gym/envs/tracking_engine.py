@@ -15,6 +15,7 @@ from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
+DRAW_A_PATH = -1
 PARALLEL_FROM = 8  # blocks, below which waking a second thread costs more than it brings
 
 
@@ -68,22 +69,39 @@ class TrackingEngine:
         """Begin a robot's sequence of episodes anew from a key."""
         self._world.seeds[:, robot] = key, 0
 
-    def restart(self, selected: NDArray[np.int64], into: Outcome | None = None) -> Outcome:
-        """Start new episodes of the selected robots; the others' entries are those of `into`, or zero."""
+    def restart(
+        self, selected: NDArray[np.int64], into: Outcome | None = None, path: int | NDArray[np.int64] = DRAW_A_PATH
+    ) -> Outcome:
+        """Start new episodes of the selected robots; the others' entries are those of `into`, or zero.
+
+        path: index of the trajectory to follow, for all or for each of the selected; DRAW_A_PATH draws one.
+        """
+        wanted = self.checked_path(path)
         outcome = self._empty() if into is None else into
         views = kernel.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
-        kernel.restart(selected, self._world, self._spread, views, self._casters, self._preview)
+        paths = np.broadcast_to(wanted, selected.shape).copy()
+        kernel.restart(selected, paths, self._world, self._spread, views, self._casters, self._preview)
         return outcome
+
+    def checked_path(self, path: Any) -> NDArray[np.int64]:
+        """Indices of trajectories as an array. Raises ValueError for one that is not there or no whole number."""
+        wanted = np.asarray(path)
+        if (
+            wanted.dtype.kind not in "iu"
+            or wanted.size == 0
+            or wanted.min() < DRAW_A_PATH
+            or wanted.max() >= len(self.trajectories)
+        ):
+            raise ValueError(f"path must be a whole number in 0 … {len(self.trajectories) - 1}, got {path!r}")
+        return wanted.astype(np.int64)
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
         """Move all robots for one control period under actions (robots, driven joints) in −1 … 1."""
         observations = np.empty((self.count, self.layout.size), dtype=np.float32)
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
-        if self.count == 1:
-            step = kernel.step_single
-        else:
-            step = kernel.step_parallel if self._parallel else kernel.step_serial
+        many = kernel.step_parallel if self._parallel else kernel.step_serial
+        step = kernel.step_single if self.count == 1 else many
         step(self._world, actions, kernel.Views(observations, reports, results), self._casters, self._preview)
         return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
 
