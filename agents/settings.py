@@ -84,6 +84,8 @@ class SACSettings(Learner):
     buffer: PositiveInt = 600_000  # transitions
     first_random: PositiveInt = 10_000  # steps before learning starts
     soft_update: Fraction = 0.005
+    entropy: PositiveFloat = 0.05  # coefficient to begin with; it is adapted
+    target_entropy: float = -2.0  # [nat] for each driven motor; exploration shrinks until it is reached
 
 
 class ComputedTorqueSettings(Frozen):

@@ -64,6 +64,7 @@ def estimate(values: Array, confidence: float) -> Estimate:
     """
     with_value = np.isfinite(values)
     per_seed = np.where(with_value, values, 0.0).sum(axis=1) / np.maximum(with_value.sum(axis=1), 1)
+    per_seed = per_seed[with_value.any(axis=1)]
     counts = with_value.sum(axis=0)
     episodes = (np.where(with_value, values, 0.0).sum(axis=0) / np.maximum(counts, 1))[counts > 0]
     if episodes.size == 0:

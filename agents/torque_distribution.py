@@ -47,7 +47,8 @@ def bounded_least_squares(b: Array, wrench: Array, low: Array, high: Array, damp
     hessian = (b.T @ b + damping * np.eye(b.shape[1])) / scale
     gradient = -(b.T @ wrench) / scale
     nothing: Any = np.zeros((0, b.shape[1]))
-    shares, _, status, _ = daqp.solve(hessian, gradient, nothing, np.maximum(high, low), low)
+    low, high = np.ascontiguousarray(low), np.ascontiguousarray(np.maximum(high, low))  # daqp does not read strides
+    shares, _, status, _ = daqp.solve(hessian, gradient, nothing, high, low)
     if status < 1:
         raise RuntimeError(f"torque distribution failed with daqp status {status} for a wrench of {wrench}")
     return np.clip(np.asarray(shares, dtype=np.float64), low, high)

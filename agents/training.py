@@ -1,7 +1,6 @@
 """Training a policy: Stable-Baselines3 on the native batch, the best policy chosen on validation paths.
 
-Optimisers turn denormal numbers and thread counts into different last bits, but never into other randomness: with the
-same settings, seed and versions on the same machine, a training run repeats.
+With the same settings, seed, number of threads and versions on the same machine, a training run repeats bit for bit.
 """
 
 import csv
@@ -80,6 +79,8 @@ def make_learner(settings: PPOSettings | SACSettings, environment: CasterVecEnv,
         gamma=settings.discount,
         train_freq=1,
         gradient_steps=settings.updates,
+        ent_coef=f"auto_{settings.entropy}",
+        target_entropy=settings.target_entropy * len(environment.batch.robot.driven),
         policy_kwargs=policy,
         seed=seed,
         device="cpu",

@@ -1,4 +1,4 @@
-"""Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control."""
+"""Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -1,22 +1,41 @@
-"""YAML files checked against typed models: an unknown key, a wrong unit or a typo is an error that says where.
+"""YAML files checked against typed models: an unknown key, a wrong value or a typo is an error that says where.
 
 PyYAML reads `3e-4` and `1e6` as strings; here they are numbers, as everywhere else.
 """
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Annotated, Any, NamedTuple, Self, TypeVar, Union, get_args, get_origin
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+LONGEST_VALUE = 80  # characters of a value in a message
 
 
 class Frozen(BaseModel):
-    """Parameters that are checked once and never change."""
+    """Parameters that are checked once and never change. Words and yes/no are not taken for numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _nothing_is_taken_for_a_number(cls, content: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        model = read(content)
+        if isinstance(content, Mapping):
+            problems = [
+                InitErrorDetails(
+                    type=PydanticCustomError("misread", "should be {kind}", {"kind": kind}), loc=loc, input=it
+                )
+                for loc, it, kind in _misread(content, vars(model))
+            ]
+            if problems:
+                raise ValidationError.from_exception_data(cls.__name__, problems)
+        return model
 
 
 class ConfigurationError(ValueError):
@@ -34,7 +53,7 @@ class _Loader(yaml.SafeLoader):
         for key_node, _ in node.value:
             if key_node.tag == "tag:yaml.org,2002:merge":
                 continue
-            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]  # PyYAML has no types here
+            key = self.construct_object(key_node, deep=True)
             if key in seen:
                 raise yaml.MarkedYAMLError(problem=f"the key {key!r} stands twice", problem_mark=key_node.start_mark)
             seen.add(key)
@@ -70,40 +89,143 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """What is wrong, key by key, in sentences."""
-    sentences = []
-    for problem in error.errors():
-        where = ".".join(str(part) for part in problem["loc"]) or "the whole"
-        if problem["type"] == "extra_forbidden":
-            known = _known_keys(model, problem["loc"][:-1])
-            near = difflib.get_close_matches(str(problem["loc"][-1]), known, n=1, cutoff=0.4)
-            hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(known)}"
-            sentences.append(f"unknown key {where!r}{hint}")
-        elif problem["type"] == "missing":
-            sentences.append(f"{where!r} is missing")
-        else:
-            message = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
-            sentences.append(f"{where!r} {message}, got {problem['input']!r}")
+    """What is wrong, key by key, in sentences. Items of lists count from 1, as joints do."""
+    problems = error.errors()
+    deeper = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
+    complaints: dict[tuple[str, str], list[str]] = {}  # by place and value: each member of a union has its own
+    for problem in problems:
+        if problem["type"] == "too_short" and problem["loc"] in deeper:
+            continue  # only items without problems were counted
+        place, message, value = _complaint(problem, model)
+        told = complaints.setdefault((place, value), [])
+        told += [message] if message not in told else []
+    sentences = [
+        place + " or ".join([first, *(other.lstrip(": ") for other in others)]) + value
+        for (place, value), (first, *others) in complaints.items()
+    ]
     return "; ".join(sentences)
 
 
-def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Names of the fields at a place inside a model."""
-    current: Any = model
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """The known name nearest to an unknown one, or all of them."""
+    names = sorted(known)
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
+
+
+def _misread(given: Any, read: Any) -> Iterator[tuple[tuple[int | str, ...], Any, str]]:
+    """Where something else was made a number or a truth value of, what it was, and what it should have been."""
+    if isinstance(given, Mapping) and isinstance(read, Mapping):
+        parts = [(key, given[key], value) for key, value in read.items() if key in given]
+    elif isinstance(given, list | tuple) and isinstance(read, list | tuple):
+        parts = [(i, *pair) for i, pair in enumerate(zip(given, read, strict=False))]
+    else:
+        parts = []
+    for part, one, result in parts:
+        yield from (((part, *below), it, kind) for below, it, kind in _misread(one, result))
+    truth = isinstance(read, bool)
+    if isinstance(read, int | float) and (isinstance(given, str) or isinstance(given, bool) != truth):
+        yield (), given, "true or false" if truth else "a number"
+
+
+def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str]:
+    """Where a problem is, what is wrong there, and the value if that does not name it: three parts of a sentence."""
+    kind, location, details = problem["type"], problem["loc"], problem.get("ctx", {})
+    if kind == "extra_forbidden":
+        place, key = _place(model, location[:-1]), str(location[-1])
+        known = {name for one in place.members if _is_model(one) for name in one.model_fields}
+        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {did_you_mean(key, known)}", ""
+    where = str(_place(model, location))
+    if kind == "missing":
+        return where, " is missing", ""
+    if kind == "union_tag_invalid":
+        known = set(str(details["expected_tags"]).replace("'", "").split(", "))
+        tag, discriminator = details["tag"], str(details["discriminator"]).strip("'")
+        return where, f": unknown {discriminator} {tag!r}; {did_you_mean(tag, known)}", ""
+    if kind == "union_tag_not_found":
+        return where, f": {details['discriminator']} is missing", ""
+    if kind in ("too_short", "too_long") and "actual_length" in details:
+        bound = f"at least {details['min_length']}" if kind == "too_short" else f"at most {details['max_length']}"
+        return where, f" should have {bound} items, got {details['actual_length']}", ""
+    message = _PLAIN.get(kind, re.sub(r"^(Value error, |\w+ (?=should))", "", problem["msg"]))
+    complete = not location or "got " in message or isinstance(details.get("error"), ConfigurationError)
+    joint = " " if message.startswith(("should", "must", "needs")) else ": "
+    return where, f"{joint if where else ''}{message}", "" if complete else f", got {_shortened(problem['input'])}"
+
+
+_PLAIN = {  # for what pydantic says in terms of Python
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "should be a mapping of keys to values"),
+    **dict.fromkeys(("tuple_type", "list_type"), "should be a list"),
+    **dict.fromkeys(("float_type", "float_parsing"), "should be a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "should be a whole number"),
+}
+
+
+def _shortened(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
+
+
+class _Place(NamedTuple):
+    """A place inside a model: the items of lists around it, the keys below the last of them, what may stand there."""
+
+    around: str  # "caster 1: " or empty
+    keys: tuple[str, ...]
+    members: tuple[Any, ...]
+
+    def __str__(self) -> str:
+        return f"{self.around}{'.'.join(self.keys)!r}" if self.keys else self.around.removesuffix(": ")
+
+
+def _place(model: type[BaseModel], location: tuple[int | str, ...]) -> _Place:
+    """The place of a pydantic location, whose parts are keys, indices and names of members of unions."""
+    here = _Place("", (), (model,))
     for part in location:
         if isinstance(part, int):
+            here = _item(here, part + 1)
             continue
-        field = current.model_fields.get(part) if hasattr(current, "model_fields") else None
-        current = _inner_model(field.annotation) if field is not None else None
-    return sorted(current.model_fields) if current is not None and hasattr(current, "model_fields") else []
+        models = [one for one in here.members if _is_model(one)]
+        fields = [one.model_fields[part].annotation for one in models if part in one.model_fields]
+        values = [get_args(one)[-1] for one in here.members if get_origin(one) is dict]
+        if fields or values:
+            here = _Place(here.around, (*here.keys, part), _members(*fields, *values))
+        else:
+            named = tuple(one for one in models if _goes_by(one, part))
+            here = here._replace(members=named or here.members)
+    return here
 
 
-def _inner_model(annotation: Any) -> Any:
-    """The model inside an annotation such as tuple[Caster, ...] or Link | None."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        inner = _inner_model(argument)
-        if inner is not None:
-            return inner
-    return None
+def _item(place: _Place, number: int) -> _Place:
+    """An item of the list at a place, called by its kind if the list is: caster 1 of casters."""
+    members = _members(*(kind for one in place.members for kind in get_args(one) if kind is not Ellipsis))
+    name = ".".join(place.keys)
+    nouns = [one.__name__.lower() for one in members if _is_model(one)]
+    if not place.keys:
+        around = f"number {number} of {place.around}"  # a list in a list
+    elif [name] == [f"{noun}s" for noun in nouns]:
+        around = f"{place.around}{nouns[0]} {number}: "
+    else:
+        around = f"{place.around}number {number} of {name!r}: "
+    return _Place(around, (), members)
+
+
+def _members(*annotations: Any) -> tuple[Any, ...]:
+    """The types that annotations allow, their unions and metadata unfolded."""
+    members: list[Any] = []
+    for annotation in annotations:
+        if get_origin(annotation) is Annotated:
+            members += _members(get_args(annotation)[0])
+        elif get_origin(annotation) in (Union, UnionType):
+            members += _members(*get_args(annotation))
+        else:
+            members.append(annotation)
+    return tuple(members)
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _goes_by(model: type[BaseModel], name: str) -> bool:
+    """Is a member of a union known by this name, that of its class or the default of its discriminator?"""
+    return model.__name__ == name or any(field.default == name for field in model.model_fields.values())

@@ -101,6 +101,14 @@ class Robot(Frozen):
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
     floor_friction: PositiveFloat = 0.7  # [-] between wheels and floor; tells how much of it is used
 
+    @field_validator("actuation", mode="before")
+    @classmethod
+    def _all_or_a_list_of_joints(cls, actuation: Any) -> Any:
+        listed = isinstance(actuation, list | tuple) and all(isinstance(joint, str) for joint in actuation)
+        if actuation != "all" and not listed:
+            raise ValueError("must be 'all' or a list of joints such as [roll_1, steer_1, roll_2]")
+        return actuation
+
     @model_validator(mode="after")
     def _joints_exist(self) -> Self:
         if self.actuation != "all":

@@ -1,9 +1,10 @@
 """YAML files and typed models: numbers are numbers, a key stands once, an error says what, where and what instead."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal, Self
 
 import pytest
-from pydantic import Field, PositiveFloat, ValidationError
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 
@@ -17,6 +18,46 @@ class Controller(Frozen):
     name: str
     gain: Gain
     axes: Annotated[tuple[Gain, ...], Field(max_length=3)] = ()
+
+
+class Wall(Frozen):
+    kind: Literal["wall"] = "wall"
+    length: PositiveFloat = 1.0
+    ends: tuple[float, float] = (0.0, 0.0)
+
+
+class Pillar(Frozen):
+    kind: Literal["pillar"] = "pillar"
+    radius: PositiveFloat = 1.0
+
+
+class World(Frozen):
+    """One field of each sort that messages and numbers depend on."""
+
+    walls: Annotated[tuple[Wall, ...], Field(min_length=1)] = (Wall(),)
+    first: Annotated[Wall | Pillar, Field(discriminator="kind")] = Wall()
+    things: tuple[Annotated[Wall | Pillar, Field(discriminator="kind")], ...] = ()
+    grid: tuple[tuple[PositiveFloat, ...], ...] = ()
+    size: PositiveFloat | Literal["any"] = "any"
+    count: PositiveInt = 1
+    open: bool = False
+    weights: dict[str, float] = Field(default_factory=dict)
+    file: Path = Path("world.csv")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if self.count == 13:
+            raise ValueError("count and walls must agree")
+        if self.count == 14:
+            raise ValueError("count must not be 14, got 14 walls")
+        return self
+
+
+def complaint(**content):
+    """What is said about a world."""
+    with pytest.raises(ConfigurationError) as caught:
+        parse(World, content, "world")
+    return str(caught.value).removeprefix("world: ")
 
 
 def write(folder, text):
@@ -123,7 +164,92 @@ def test_error_names_file_key_value_and_what_would_be_right(tmp_path, text, said
 def test_all_errors_are_told_at_once(tmp_path):
     with pytest.raises(ConfigurationError, match=r"name.*gain\.proportional") as caught:
         load(tmp_path, "gain: {proportional: -1}")
+    assert (
+        complaint(cuont=1, fil="x")
+        == "unknown key 'cuont'; did you mean 'count'?; unknown key 'fil'; did you mean 'file'?"
+    )
     assert isinstance(caught.value, ValueError)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"walls": [{}, {"length": -1}]}, "wall 2: 'length' should be greater than 0, got -1"),
+        ({"walls": [{"ends": [0, "b"]}]}, "wall 1: number 2 of 'ends' should be a number, got 'b'"),
+        ({"walls": [{"ends": [0]}]}, "wall 1: number 2 of 'ends' is missing"),
+        ({"walls": [{"ends": [0, 1, 2]}]}, "wall 1: 'ends' should have at most 2 items, got 3"),
+        ({"walls": []}, "'walls' should have at least 1 items, got 0"),
+        ({"walls": [3]}, "wall 1 should be a mapping of keys to values, got 3"),
+        ({"walls": 3}, "'walls' should be a list, got 3"),
+        ({"things": [{"kind": "wall"}, {"kind": "pillar", "radius": 0}]}, "number 2 of 'things': 'radius' should be"),
+        ({"grid": [[1], [1, -1]]}, "number 2 of number 2 of 'grid' should be greater than 0, got -1"),
+        ({"weights": {"speed": "high"}}, "'weights.speed' should be a number, got 'high'"),
+        ({"count": 1.5}, "'count' should be a whole number, got 1.5"),
+    ],
+)
+def test_items_count_from_one_and_are_called_by_their_kind(content, said):
+    assert complaint(**content).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"first": {"kind": "wall", "lenght": 1}}, "unknown key 'first.lenght'; did you mean 'length'?"),
+        ({"first": {"kind": "pillar", "lenght": 1}}, "unknown key 'first.lenght'; known are kind, radius"),
+        (
+            {"things": [{"kind": "pillar", "radios": 1}]},
+            "number 1 of 'things': unknown key 'radios'; did you mean 'radius'?",
+        ),
+        ({"first": {"kind": "pilar"}}, "'first': unknown kind 'pilar'; did you mean 'pillar'?"),
+        ({"first": {"radius": 1}}, "'first': 'kind' is missing"),
+        ({"size": "some"}, "'size' should be a number or should be 'any', got 'some'"),
+    ],
+)
+def test_members_of_a_union_are_told_apart(content, said):
+    assert complaint(**content) == said
+
+
+def test_items_with_problems_are_not_counted_as_missing():
+    assert complaint(walls=[{"length": 0}]) == "wall 1: 'length' should be greater than 0, got 0"
+
+
+def test_problem_of_the_whole_is_told_without_all_of_its_content():
+    assert complaint(count=13) == "count and walls must agree"
+    assert complaint(count=14) == "count must not be 14, got 14 walls"
+
+
+def test_long_values_are_cut():
+    said = complaint(count=list(range(100)))
+    assert said.startswith("'count' should be a whole number, got [0, 1, 2, 3")
+    assert said.endswith("…")
+    assert len(said) < 130
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"count": True}, "'count' should be a number, got True"),
+        ({"count": "5"}, "'count' should be a number, got '5'"),
+        ({"size": "5"}, "'size' should be a number, got '5'"),
+        ({"grid": [[1], [2, True]]}, "number 2 of number 2 of 'grid' should be a number, got True"),
+        ({"walls": [{"length": "5"}]}, "wall 1: 'length' should be a number, got '5'"),
+        ({"first": {"kind": "pillar", "radius": True}}, "'first.radius' should be a number, got True"),
+        ({"weights": {"speed": False}}, "'weights.speed' should be a number, got False"),
+        ({"open": 1}, "'open' should be true or false, got 1"),
+        ({"open": "yes"}, "'open' should be true or false, got 'yes'"),
+    ],
+)
+def test_words_and_truth_values_are_no_numbers(content, said):
+    assert complaint(**content) == said
+
+
+def test_what_yaml_and_python_write_differently_is_accepted():
+    world = parse(
+        World,
+        {"count": 1e3, "size": 2, "grid": [[1, 2.5]], "open": True, "file": "a.csv", "weights": {"a": 1}},
+        "world",
+    )
+    assert world == World(count=1000, size=2.0, grid=((1.0, 2.5),), open=True, file=Path("a.csv"), weights={"a": 1.0})
 
 
 def test_parameters_never_change():

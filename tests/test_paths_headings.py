@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pydantic import ValidationError
 
+from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.paths.headings import Fixed, Profile, Spinning, Tangent
 from caster_gym.paths.shapes import Circle, Lemniscate
 
@@ -65,7 +65,7 @@ def test_a_kind_may_be_given_by_its_name_alone(kind):
     [
         ("spining", "unknown kind 'spining'; did you mean 'spinning'"),
         ({"turns": 1.0}, "'kind' is missing; known are fixed, profile, spinning, tangent"),
-        ({"kind": "spinning", "trns": 1.0}, "unknown key 'trns'; did you mean 'turns'"),
+        ({"kind": "spinning", "trns": 1.0}, "unknown key 'heading.trns'; did you mean 'turns'"),
         ({"kind": ["fixed"]}, "unknown kind"),
         ({"kind": "profile", "angles": [1.0]}, "angles"),
         ({"kind": "profile", "angles": [0.0, 1.0], "progress": [0.0, 0.5, 1.0]}, "got 3 for 2"),
@@ -75,5 +75,5 @@ def test_a_kind_may_be_given_by_its_name_alone(kind):
     ],
 )
 def test_a_heading_that_cannot_be_is_refused_by_name(heading, message):
-    with pytest.raises(ValidationError, match=message):
-        Circle(heading=heading)
+    with pytest.raises(ConfigurationError, match=message):
+        parse(Circle, {"heading": heading}, "path")

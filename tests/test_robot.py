@@ -53,7 +53,7 @@ REFUSED = {
     "negative mass": (lambda r: r["platform"].update(mass=-5.0), ["platform.mass", "greater than 0", "-5"]),
     "negative wheel mass": (lambda r: r["casters"][0]["wheel"].update(mass=-1.0), ["wheel.mass", "-1"]),
     "zero trail": (lambda r: r["casters"][0].update(trail=0.0), ["trail", "greater than 0"]),
-    "misspelt key": (rename_trail, ["trial", "did you mean 'trail'"]),
+    "misspelt key": (rename_trail, ["caster 2: unknown key 'trial'", "did you mean 'trail'"]),
     "key too much": (lambda r: r.update(colour="red"), ["colour"]),
     "missing key": (lambda r: r["platform"].pop("inertia"), ["platform.inertia", "missing"]),
     "not a number": (lambda r: r["casters"][0].update(x=float("nan")), ["x", "finite", "nan"]),
@@ -63,13 +63,22 @@ REFUSED = {
         lambda r: r["casters"][0].update(gear=[[1.0, 2.0], [2.0, 4.0]]),
         ["gear", "invertible", "[[1.0, 2.0], [2.0, 4.0]]"],
     ),
-    "gear of three columns": (lambda r: r["casters"][0].update(gear=[[1, 0, 0], [0, 1, 0]]), ["gear", "[1, 0, 0]"]),
+    "gear of three columns": (
+        lambda r: r["casters"][0].update(gear=[[1, 0, 0], [0, 1, 0]]),
+        ["caster 1: number 1 of 'gear'", "at most 2 items, got 3"],
+    ),
+    "yes for a number": (lambda r: r["platform"].update(mass=True), ["'platform.mass' should be a number, got True"]),
+    "a number in quotes": (lambda r: r["platform"].update(mass="5"), ["'platform.mass' should be a number, got '5'"]),
     "one caster": (lambda r: r["casters"].pop(), ["casters", "at least 2"]),
     "casters on one spot": (lambda r: r["casters"][1].update(x=0.2), ["casters", "different places"]),
     "unknown joint": (lambda r: r.update(actuation=["roll_1", "steer_9"]), ["steer_9", "roll_1, steer_1, roll_2"]),
     "joint named twice": (lambda r: r.update(actuation=["roll_1", "roll_1"]), ["twice", "roll_1"]),
     "no joint": (lambda r: r.update(actuation=[]), ["at least one joint"]),
-    "unknown actuation": (lambda r: r.update(actuation="some"), ["actuation", "'all'", "'some'"]),
+    "unknown actuation": (
+        lambda r: r.update(actuation="some"),
+        ["'actuation' must be 'all' or a list of joints", "got 'some'"],
+    ),
+    "numbers for joints": (lambda r: r.update(actuation=[1, 2]), ["must be 'all' or a list of joints", "got [1, 2]"]),
     "dent in the outline": (polygon((0, 0), (1, 0), (0.2, 0.2), (0, 1)), ["footprint", "convex", "0.2"]),
     "clockwise outline": (polygon((0, 0), (0, 1), (1, 1), (1, 0)), ["footprint", "counter-clockwise"]),
     "outline that crosses itself": (
@@ -93,6 +102,20 @@ def test_bad_file_is_refused_by_key_value_and_file(tmp_path, case):
         load_robot(path)
     for words in ["mine.yaml", *said]:
         assert words in str(caught.value)
+
+
+def test_bad_caster_is_not_called_a_missing_one(tmp_path):
+    path = write(tmp_path, lambda robot: robot["casters"][1].update(trail=-0.02))
+    with pytest.raises(ConfigurationError) as caught:
+        load_robot(path)
+    assert str(caught.value) == f"{path}: caster 2: 'trail' should be greater than 0, got -0.02"
+
+
+def test_problem_of_the_whole_robot_is_told_without_its_content(tmp_path):
+    path = write(tmp_path, lambda robot: robot["casters"][1].update(x=0.2))
+    with pytest.raises(ConfigurationError) as caught:
+        load_robot(path)
+    assert str(caught.value) == f"{path}: at least two casters must stand at different places"
 
 
 def test_good_file_is_loaded_by_its_path(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space
-from caster_gym.envs.tracking_engine import DRAW_A_PATH, info_of
+from caster_gym.envs.tracking_engine import DRAW_A_PATH, info_of_one
 
 Observation = NDArray[np.float32]
 
@@ -84,7 +84,7 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
             self.engine.seed(0, int(self.np_random.integers(2**63)))
             self._started = True
         outcome = self.engine.restart(_ONLY, path=path)
-        return outcome.observations[0], _single(info_of(outcome.reports))
+        return outcome.observations[0], info_of_one(outcome.reports[:, 0])
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
@@ -101,16 +101,8 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
             float(outcome.rewards[0]),
             bool(outcome.terminated[0]),
             bool(outcome.truncated[0]),
-            _single(info_of(outcome.reports)),
+            info_of_one(outcome.reports[:, 0]),
         )
 
 
 _ONLY = np.zeros(1, dtype=np.int64)
-
-
-def _single(infos: dict[str, Any]) -> dict[str, Any]:
-    """The only robot's entries of a batch of infos."""
-    return {
-        key: _single(value) if isinstance(value, dict) else value[0] if value.ndim > 1 else value[0].item()
-        for key, value in infos.items()
-    }

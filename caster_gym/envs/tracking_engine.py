@@ -1,6 +1,6 @@
 """The tracking task for any number of robots, moved by compiled code; both environments are thin faces of this."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,19 +141,28 @@ def _table(trajectories: Sequence[Trajectory], longest: int | None) -> tuple[NDA
 
 
 def info_of(reports: NDArray[np.float64]) -> dict[str, Any]:
-    """The report as named quantities: arrays (robots,) or (robots, width), reward terms in a dictionary."""
-    first = kernel.FIRST_TERM
-    pose = first + kernel.TERMS
+    """Named quantities of all robots: arrays (robots,) or (robots, width), reward terms in a dictionary."""
+    return _named(reports, lambda first, end: reports[first:end].T)
+
+
+def info_of_one(report: NDArray[np.float64]) -> dict[str, Any]:
+    """Named quantities of one robot: numbers or arrays (width,), reward terms in a dictionary."""
+    return _named(report.tolist(), lambda first, end: report[first:end])
+
+
+def _named(row: Any, rows: Callable[[int, int], NDArray[np.float64]]) -> dict[str, Any]:
+    terms = kernel.FIRST_TERM
+    pose = terms + kernel.TERMS
     return {
-        "position_error": reports[2],
-        "heading_error": reports[kernel.HEADING_SIN],
-        "reward_terms": {name: reports[first + i] for i, name in enumerate(Terms._fields)},
-        "torque": reports[kernel.FIXED_REPORT_ROWS :].T,
-        "power": reports[5],
-        "traction_use": reports[6],
-        "conditioning": reports[7],
-        "pose": reports[pose : pose + 4].T,
-        "reference_pose": reports[pose + 4 : pose + 8].T,
-        "left_corridor": reports[0] > 0.0,
-        "not_finite": reports[1] > 0.0,
+        "position_error": row[2],
+        "heading_error": row[kernel.HEADING_SIN],
+        "reward_terms": {name: row[terms + i] for i, name in enumerate(Terms._fields)},
+        "torque": rows(kernel.FIXED_REPORT_ROWS, len(row)),
+        "power": row[5],
+        "traction_use": row[6],
+        "conditioning": row[7],
+        "pose": rows(pose, pose + 4),
+        "reference_pose": rows(pose + 4, pose + 8),
+        "left_corridor": row[0] > 0.0,
+        "not_finite": row[1] > 0.0,
     }

@@ -1,4 +1,4 @@
-"""How well the driven motors can push the platform: the singular values of their wrenches. docs/equations.md, section A.
+"""How well the driven motors can push the platform: singular values of their wrenches. docs/equations.md, section A.
 
 Motor torques are taken as shares of their greatest, moments as forces at a characteristic length, so that the ratio of
 least to greatest singular value means something: 1 pushes equally well in every direction, 0 cannot push in one.

@@ -1,4 +1,4 @@
-"""Forces between wheels and floor: they tell when rolling without slip stops being true. docs/equations.md, section G."""
+"""Forces between wheels and floor: they tell when rolling without slip ends. docs/equations.md, section G."""
 
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, rate_rows, rates, wheel_centre
 from caster_gym.mechanics.dynamics import joint_friction

@@ -1,4 +1,4 @@
-"""State and time step. Directions are unit vectors: (c, s)' = rate · (−s, c), so nothing wraps and no angle is needed."""
+"""State and time step. Directions are unit vectors: (c, s)' = rate · (−s, c), so nothing wraps; no angle is needed."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Vectors of three scalars and symmetric 3×3 matrices (xx, xy, xz, yy, yz, zz): the platform has three degrees of freedom."""
+"""Vectors of three scalars and symmetric 3×3 matrices (xx, xy, xz, yy, yz, zz), for three degrees of freedom."""
 
 from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, clip, maximum, sqrt, where
 

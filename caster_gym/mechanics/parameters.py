@@ -3,7 +3,7 @@
 Meaning and signs: docs/equations.md, section P. SI units throughout.
 """
 
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from caster_gym.mechanics.scalars import Scalar
 from caster_gym.robot import Caster, Robot

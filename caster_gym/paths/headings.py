@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from caster_gym.configuration import Frozen, parse
+from caster_gym.configuration import ConfigurationError, Frozen
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.trajectory import Array, Plane
 
@@ -91,8 +91,8 @@ def _read_heading(value: Any) -> Any:
         return value
     kind = content.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:
-        raise ValueError(unknown_name("kind", kind, _KINDS))
-    return parse(_KINDS[kind], content, kind)
+        raise ConfigurationError(unknown_name("kind", kind, _KINDS))
+    return content
 
 
 Heading = Annotated[Tangent | Fixed | Spinning | Profile, Field(discriminator="kind"), BeforeValidator(_read_heading)]

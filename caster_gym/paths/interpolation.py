@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]  # SciPy ships no types
+from scipy.interpolate import make_interp_spline
 
 from caster_gym.paths.trajectory import Array
 
