@@ -15,7 +15,8 @@ import caster_gym
 from caster_gym import Model, load_robot
 from caster_gym.engines import numba_compiler
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
-from caster_gym.engines.numba_fleet import PARALLEL_FROM, Fleet
+from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.threads import BLOCKS_PER_THREAD
 from caster_gym.engines.torch_model import TorchModel
 from tests.random_robots import random_robot
 
@@ -95,10 +96,10 @@ def test_one_robot_alone_equals_the_same_robot_in_a_batch():
         assert_array_equal(alone.state[0], together[i])
 
 
-def test_serial_and_parallel_batches_are_equal():
+def test_batches_on_one_and_on_several_threads_are_equal():
     """To the last bit: a small batch runs on one thread, a large one on all of them."""
     few = 3 * LANES + 5
-    assert block_count(few) < PARALLEL_FROM <= block_count(MANY)
+    assert block_count(few) < 2 * BLOCKS_PER_THREAD <= block_count(MANY)
     robots, (_, directions), torques = different_robots(MANY), random_states(4, MANY), random_torques(4, MANY)
     large, small = Fleet(robots), Fleet(robots[:few])
     large.state, small.state = directions, directions[:few]
@@ -210,18 +211,17 @@ from caster_gym import load_robot
 from caster_gym.engines import numba_fleet
 robot = load_robot("chung2008")
 robot = robot.model_copy(update={"casters": robot.casters[:2]})
-for count in (2, numba_fleet.PARALLEL_FROM * 32):
-    numba_fleet.Fleet(robot, count).step(np.zeros((count, 4)), 1e-3)
-stats = [numba_fleet._step_serial.stats, numba_fleet._step_parallel.stats]
-print(json.dumps([[sum(s.cache_hits.values()), sum(s.cache_misses.values())] for s in stats]))
+numba_fleet.Fleet(robot, 2).step(np.zeros((2, 4)), 1e-3)
+stats = numba_fleet._compiled_step_blocks.stats
+print(json.dumps([sum(stats.cache_hits.values()), sum(stats.cache_misses.values())]))
 """
 
 
 @pytest.fixture(scope="module")
 def compilations(tmp_path_factory):
-    """Hits and misses of the cache of the serial and the parallel step, in the first process and in a second one."""
+    """Hits and misses of the cache in the first process and in a second one."""
     folder = tmp_path_factory.mktemp("cache")
-    places = {"XDG_CACHE_HOME": str(folder), "NUMBA_NUM_THREADS": "2"}
+    places = {"XDG_CACHE_HOME": str(folder)}
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
 
     def run():
@@ -233,13 +233,12 @@ def compilations(tmp_path_factory):
     return run(), run(), folder
 
 
-def test_the_first_process_compiles_both_steps(compilations):
-    """Numba's cache does not tell parallel from serial code: each must find its own or none."""
-    assert compilations[0] == [[0, 1], [0, 1]]
+def test_the_first_process_compiles(compilations):
+    assert compilations[0] == [0, 1]
 
 
 def test_a_second_process_compiles_nothing(compilations):
-    assert compilations[1] == [[1, 0], [1, 0]]
+    assert compilations[1] == [1, 0]
 
 
 def test_compiled_code_lies_in_the_cache_of_the_user(compilations):

@@ -46,20 +46,17 @@ def teach(module: ModuleType) -> None:
             register_jitable(**INLINE)(function)
 
 
-def compiled(function: Callable[..., Any], parallel: bool = False) -> Any:
+def compiled(function: Callable[..., Any]) -> Any:
     """The function compiled at its first call, or read from the cache of an earlier process."""
-    with _cache_folder(parallel):
-        return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=parallel)(function)
+    with _cache_folder():
+        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
 
 
 @contextmanager
-def _cache_folder(parallel: bool) -> Iterator[None]:
-    """Numba's cache in a folder of its own for each version of our sources, and for parallel code.
-
-    Numba itself watches one file only, and takes parallel and serial code of one function for the same.
-    """
+def _cache_folder() -> Iterator[None]:
+    """Numba's cache in a folder of its own for each version of our sources: Numba itself watches one file only."""
     previous = _SETTINGS.CACHE_DIR
-    _SETTINGS.CACHE_DIR = str(_cache_root(previous) / _source_digest() / ("parallel" if parallel else "serial"))
+    _SETTINGS.CACHE_DIR = str(_cache_root(previous) / _source_digest())
     try:
         yield
     finally:

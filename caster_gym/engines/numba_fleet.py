@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numba
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
@@ -20,11 +19,10 @@ from caster_gym.engines.lanes import (
     write,
 )
 from caster_gym.engines.numba_compiler import INLINE, compiled
+from caster_gym.engines.threads import over_blocks
 from caster_gym.mechanics.integration import pack_state, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, pack_parameters, robot_parameters
 from caster_gym.robot import Robot
-
-PARALLEL_FROM = 8  # blocks, below which waking a second thread costs more than it brings
 
 
 @register_jitable(**INLINE)
@@ -48,15 +46,14 @@ def _step_one(blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> No
     _step_lanes(blocks[0], 1, steps, h, casters)
 
 
-def _step_fleet(blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
-    for i in numba.prange(len(blocks)):
+def _step_blocks(first: int, end: int, blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
+    for i in range(first, end):
         _compiled_step_block(blocks[i], steps, h, casters)
 
 
 _compiled_step_block = compiled(_step_block)
 _compiled_step_one = compiled(_step_one)
-_step_serial = compiled(_step_fleet)
-_step_parallel = compiled(_step_fleet, parallel=True)
+_compiled_step_blocks = compiled(_step_blocks)
 
 
 class Fleet:
@@ -111,10 +108,9 @@ class Fleet:
             robot.check_time_step(dt)
         to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)
         if self.count == 1:
-            step = _compiled_step_one
+            _compiled_step_one(self._blocks, steps, dt, self._casters)
         else:
-            step = _step_parallel if len(self._blocks) >= PARALLEL_FROM else _step_serial
-        step(self._blocks, steps, dt, self._casters)
+            over_blocks(_compiled_step_blocks, len(self._blocks), self._blocks, steps, dt, self._casters)
 
     def _checked(self, name: str, value: ArrayLike, width: int) -> NDArray[np.float64]:
         array = np.asarray(value, dtype=np.float64)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
+from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import tracking_kernel as kernel
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.track_task import TrackTask
@@ -16,7 +17,6 @@ from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
-PARALLEL_FROM = 8  # blocks, below which waking a second thread costs more than it brings
 
 
 class Outcome(NamedTuple):
@@ -41,7 +41,6 @@ class TrackingEngine:
         self.layout = ObservationLayout(robot, task.preview)
         self._casters = tuple(range(robot.caster_count))
         self._preview = tuple(range(len(task.preview)))
-        self._parallel = block_count(count) >= PARALLEL_FROM
         self._spread = np.array([task.start_offset, task.start_turn])
         self._report_rows = kernel.FIXED_REPORT_ROWS + 2 * robot.caster_count
         samples, spans = _table(self.trajectories, longest)
@@ -100,9 +99,11 @@ class TrackingEngine:
         observations = np.empty((self.count, self.layout.size), dtype=np.float32)
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
-        many = kernel.step_parallel if self._parallel else kernel.step_serial
-        step = kernel.step_single if self.count == 1 else many
-        step(self._world, actions, kernel.Views(observations, reports, results), self._casters, self._preview)
+        arguments = (self._world, actions, kernel.Views(observations, reports, results), self._casters, self._preview)
+        if self.count == 1:
+            kernel.step_single(*arguments)
+        else:
+            over_blocks(kernel.step_blocks, len(self._world.blocks), *arguments)
         return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
 
     def _empty(self) -> Outcome:

@@ -8,7 +8,6 @@ their lengths are part of their types, so that all rows are constants of the com
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numba.extending import register_jitable
 
@@ -236,8 +235,8 @@ def _step_single(world: World, actions: Any, views: Views, casters: Any, preview
     _step_lanes(0, 1, _look_at_first, world, actions, views, casters, preview)
 
 
-def _step_all(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    for i in numba.prange(len(world.blocks)):
+def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+    for i in range(first, end):
         step_block(i, world, actions, views, casters, preview)
 
 
@@ -274,6 +273,5 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
 look_at_one = compiled(_look_at_one)
 step_block = compiled(_step_block)
 step_single = compiled(_step_single)
-step_serial = compiled(_step_all)
-step_parallel = compiled(_step_all, parallel=True)
+step_blocks = compiled(_step_blocks)
 restart = compiled(_restart)
