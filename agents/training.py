@@ -206,7 +206,8 @@ def train(
         learner.learn(settings.steps, callback=watcher)
         completed = True
     finally:
-        watcher.validate()
+        if not watcher.history or watcher.history[-1].steps < learner.num_timesteps:
+            watcher.validate()
         history = [result._asdict() for result in watcher.history]
         write_provenance(
             folder,

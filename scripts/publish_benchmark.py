@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = re.compile(r"(<!-- table: begin -->\n).*?(<!-- table: end -->)", re.DOTALL)
-FILES = ("table.md", "summary.csv", "episodes.csv", "run.yaml", "overview.png", "paths.png", "errors.png", "torques.png")
+FILES = ("table.md", "summary.csv", "run.yaml", "overview.png", "paths.png", "errors.png", "torques.png")
 
 
 def publish(run: Path) -> None:

@@ -6,8 +6,8 @@ meet in a point or are parallel, no motor pushes in some direction. Kim et al. (
 """
 
 import warnings
-from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,9 @@ SINGULAR = 0.01  # [-] below it the weakest push is less than a hundredth of the
 DEGREES_OF_FREEDOM = 3
 
 _SAMPLES = (16, 512)  # batches × samples: the best of each batch starts a descent, lest all start in one basin
-_ROUNDS = 40  # Newton steps; most searches need ten
+_DESCENT: Any = {"gtol": 1e-6, "maxiter": 50}  # of BFGS: L-BFGS-B spins in threaded BLAS, 10 s on a busy machine
 _ZERO = 1e-7  # [-] conditioning is the root of an eigenvalue, so rounding alone makes 1e-8; nothing lies below zero
-_DIFFERENCE = 1e-4  # [rad] of differences of conditioning², which is smooth at its zeros, where conditioning has a kink
-
-Array = NDArray[np.float64]
+_DIFFERENCE = 1e-6  # [rad] of central differences; conditioning² is smooth at its zeros, where conditioning has a kink
 
 
 class ActuationWarning(UserWarning):
@@ -37,38 +35,29 @@ def worst_conditioning(robot: Robot) -> tuple[float, tuple[float, ...]]:
     Angles in rad, in (−π, π]. The search is global by sampling and local by descent, with fixed seeds: the value is
     attained at the angles, and another search may find a slightly lower one. Zeros come out as rounding, about 1e-8.
     """
+    from scipy.optimize import minimize
+
     model = Model(robot)
     samples = np.random.default_rng(0).uniform(-np.pi, np.pi, (*_SAMPLES, robot.caster_count))
-    starts = samples[np.arange(len(samples)), model.conditioning(samples).argmin(axis=1)]
-    ends = _descend(starts, lambda steering: model.conditioning(steering) ** 2)
-    values = model.conditioning(ends)
-    steering = ends[values.argmin()]
-    return float(values.min()), tuple(float(np.pi - (np.pi - angle) % (2.0 * np.pi)) for angle in steering)
+    values = model.conditioning(samples)
+    starts = samples[np.arange(len(samples)), values.argmin(axis=1)]
+    scale = max(float(values.min()) ** 2, 1e-12)  # makes the objective of order 1, where the tolerances mean something
 
+    def squared(steering: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        steps = _DIFFERENCE * np.eye(len(steering))
+        around = model.conditioning(np.concatenate(([steering], steering + steps, steering - steps))) ** 2 / scale
+        forward, backward = np.split(around[1:], 2)
+        return float(around[0]), (forward - backward) / (2.0 * _DIFFERENCE)
 
-def _descend(points: Array, function: Callable[[Array], Array]) -> Array:
-    """Points (P, n) moved downhill by damped Newton steps on differences, until one is at zero or all are at rest."""
-    n = points.shape[1]
-    axes = _DIFFERENCE * np.eye(n)
-    pairs = (axes[:, None] + axes).reshape(-1, n)
-    stencil = np.concatenate((np.zeros((1, n)), axes, -axes, pairs, -pairs))
-    damping = np.full(len(points), 1e-3)  # [-] of the greatest curvature
-    for _ in range(_ROUNDS):
-        value, plus, minus, both_plus, both_minus = np.split(
-            function(points[:, None] + stencil), np.cumsum([1, n, n, n * n]), axis=1
-        )
-        gradient = (plus - minus) / (2.0 * _DIFFERENCE)
-        single, both = plus + minus, (both_plus + both_minus).reshape(-1, n, n)
-        hessian = (both - single[:, :, None] - single[:, None, :] + 2.0 * value[:, :, None]) / (2.0 * _DIFFERENCE**2)
-        curvatures, directions = np.linalg.eigh(hessian)
-        stiffness = np.abs(curvatures) + damping[:, None] * np.abs(curvatures).max(axis=1, keepdims=True) + 1e-300
-        steps = -np.einsum("pij,pj,pkj,pk->pi", directions, 1.0 / stiffness, directions, gradient)
-        lower = function(points + steps) < value[:, 0]
-        points = np.where(lower[:, None], points + steps, points)
-        damping = np.where(lower, 0.1, 10.0) * damping
-        if value.min() < _ZERO**2 or (damping > 1e6).all():
+    least, worst = float("inf"), starts[0]
+    for start in starts[values.min(axis=1).argsort()]:
+        end = minimize(squared, start, jac=True, method="BFGS", options=_DESCENT).x
+        value = abs(float(model.conditioning(end)))
+        if value < least:
+            least, worst = value, end
+        if least < _ZERO:
             break
-    return points
+    return least, tuple(float(np.pi - (np.pi - angle) % (2.0 * np.pi)) for angle in worst)
 
 
 def warn_if_singular(robot: Robot) -> None:

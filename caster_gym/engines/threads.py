@@ -1,4 +1,4 @@
-"""Compiled code on several cores: blocks of robots shared out over Python threads, which release the interpreter's lock.
+"""Compiled code on several cores: blocks of robots shared out over threads that release the interpreter's lock.
 
 Threads that sleep while they wait keep their speed beside other busy processes; spinning ones, as OpenMP's, then lose
 most of it. How many are used is `numba.get_num_threads()`, so that NUMBA_NUM_THREADS and numba.set_num_threads hold.
