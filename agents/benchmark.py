@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
+from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
 
 from .bundle import load_bundle
@@ -42,25 +43,40 @@ class Job(NamedTuple):
     folder: Path
 
 
+class Comparison(NamedTuple):
+    """Checked settings of a comparison and of all that takes part."""
+
+    settings: BenchmarkSettings
+    task: TaskSettings
+    agents: dict[str, PPOSettings | SACSettings | ComputedTorqueSettings]  # by the stems of their files
+
+
 class Contender(NamedTuple):
     """An agent that is ready to be compared."""
 
+    name: str
     agent: Agent
     seed: int | None
 
 
-def run_benchmark(settings: BenchmarkSettings, folder: Path, changes: Mapping[str, Any] | None = None) -> str:
+def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | None = None) -> Comparison:
+    """Read all files that a comparison names. changes: fields of learned agents to set, such as {"steps": 10000}."""
+    agents: dict[str, PPOSettings | SACSettings | ComputedTorqueSettings] = {}
+    for name in settings.agents:
+        stem = Path(name).stem
+        if stem in agents:
+            raise ConfigurationError(f"agents of a comparison need different file names, got {stem!r} twice")
+        agent = read_agent(name)
+        agents[stem] = agent if isinstance(agent, ComputedTorqueSettings) else read_agent(name, changes)
+    return Comparison(settings, read_settings(TaskSettings, "tasks", settings.task), agents)
+
+
+def run_benchmark(comparison: Comparison, folder: Path) -> str:
     """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
 
-    The folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures. changes: fields of learned
-    agents to set, for instance {"steps": 10000}.
+    The folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
     """
-    task = read_settings(TaskSettings, "tasks", settings.task)
-    agents = {name: read_agent(name) for name in dict.fromkeys(settings.agents)}
-    agents = {
-        name: agent if isinstance(agent, ComputedTorqueSettings) else read_agent(name, changes)
-        for name, agent in agents.items()
-    }
+    settings, task, agents = comparison
     jobs = [
         Job(f"{name} seed {seed}", task, agent, seed, folder / "policies" / f"{name}-{seed}")
         for name, agent in agents.items()
@@ -79,10 +95,11 @@ def run_benchmark(settings: BenchmarkSettings, folder: Path, changes: Mapping[st
     contenders: list[Contender] = []
     for name, agent in agents.items():
         if name in model_based:
-            contenders.append(Contender(model_based[name][0], None))
-        contenders += [
-            Contender(load_bundle(job.folder / "best").agent, job.seed) for job in jobs if job.agent is agent
-        ]
+            contenders.append(Contender(model_based[name][0].name, model_based[name][0], None))
+        for job in (job for job in jobs if job.agent is agent):
+            learned = load_bundle(job.folder / "best").agent
+            alone = sum(other.algorithm == job.agent.algorithm for other in agents.values()) == 1
+            contenders.append(Contender(learned.name if alone else name, learned, job.seed))
     results, episodes = compare(contenders, test, settings)
 
     text = table(results, settings.confidence)
@@ -108,10 +125,10 @@ def compare(
     driven = [test.robot.joints.index(joint) for joint in test.robot.driven]
     results: list[Result] = []
     shown: dict[str, Episodes] = {}
-    for agent, seed in tqdm(contenders, desc="evaluating", unit="agent"):
+    for name, agent, seed in tqdm(contenders, desc="evaluating", unit="agent"):
         episodes = roll_out(agent, test, settings.start_seed)
-        shown.setdefault(agent.name, episodes)
-        results.append(Result(agent.name, seed, episodes.names, measure(episodes, settings.settling, driven)))
+        shown.setdefault(name, episodes)
+        results.append(Result(name, seed, episodes.names, measure(episodes, settings.settling, driven)))
     return results, shown
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 from tqdm import tqdm
+
+from caster_gym.configuration import parse_yaml
 
 from .settings import (
     BenchmarkSettings,
@@ -89,12 +90,13 @@ def evaluate(
         if Path(policy).is_dir():
             bundle = load_bundle(Path(policy))
             bundle.check_fits(test.engine.layout)
-            contender = Contender(bundle.agent, None)
+            contender = Contender(bundle.agent.name, bundle.agent, None)
         else:
             known = read_agent(policy)
             if not isinstance(known, ComputedTorqueSettings):
                 raise ValueError(f"agent {policy!r} must be trained first: give the folder of its policy")
-            contender = Contender(tune(known, test_batch(tasks, tasks.validation, starts=1))[0], None)
+            controller, _ = tune(known, test_batch(tasks, tasks.validation, starts=1))
+            contender = Contender(controller.name, controller, None)
         _prepare(out, overwrite)
         results, episodes = compare([contender], test, settings)
         text = table(results, settings.confidence)
@@ -116,11 +118,12 @@ def benchmark(
 ) -> None:
     """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
     with _plain_errors():
-        from .benchmark import run_benchmark
+        from .benchmark import read_comparison, run_benchmark
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
+        comparison = read_comparison(settings, _parsed(change))
         _prepare(out, overwrite)
-        typer.echo(run_benchmark(settings, out, _parsed(change)))
+        typer.echo(run_benchmark(comparison, out))
         typer.echo(f"Results, policies and figures are in {out}.")
 
 
@@ -131,7 +134,7 @@ def _parsed(changes: list[str] | None) -> dict[str, Any]:
         key, equals, value = change.partition("=")
         if not equals or not key:
             raise ValueError(f"--set needs KEY=VALUE, got {change!r}")
-        parsed[key] = yaml.safe_load(value)
+        parsed[key] = parse_yaml(value, f"--set {change}")
     return parsed
 
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, model_validat
 
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 
 from .computed_torque import KnownModel
@@ -29,13 +30,20 @@ class TaskSettings(Frozen):
 
     @model_validator(mode="after")
     def _paths_are_held_out(self) -> Self:
-        for kind, others in (("test", self.test), ("validation", self.validation)):
-            shared = [path for path in others if path in self.train]
+        for kind, paths, other, used in (
+            ("test", self.test, "training", self.train),
+            ("validation", self.validation, "training", self.train),
+            ("test", self.test, "validation", self.validation),
+        ):
+            shared = [path for path in paths if _first_of(path) in map(_first_of, used)]
             if shared:
-                raise ValueError(f"a {kind} path must not be among the training paths, got {shared[0]!r} in both")
-        if any(path in self.validation for path in self.test):
-            raise ValueError("a test path must not be among the validation paths")
+                raise ValueError(f"a {kind} path must not be among the {other} paths, got {shared[0]!r} in both")
         return self
+
+
+def _first_of(path: PathSpecification) -> PathSpecification:
+    """Random paths of one seed begin alike, however many they are: the first stands for all of them."""
+    return path.model_copy(update={"count": 1}) if isinstance(path, RandomPaths) else path
 
 
 class Learner(Frozen):

@@ -70,14 +70,23 @@ _Loader.add_implicit_resolver(
 def read_yaml(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds a mapping."""
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ConfigurationError(f"there is no file {str(path)!r}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+    except (UnicodeDecodeError, OSError) as error:
         raise ConfigurationError(f"{path} cannot be read as YAML: {error}") from error
+    content = parse_yaml(text, str(path))
     if not isinstance(content, dict):
         raise ConfigurationError(f"{path} must hold a mapping of keys to values, got {type(content).__name__}")
     return content
+
+
+def parse_yaml(text: str, source: str) -> Any:
+    """Value of a YAML text from a source that errors name."""
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 
 
 def parse(model: type[Model], content: Mapping[str, Any], source: str) -> Model:

@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 import mujoco
-import numba
 import numpy as np
 from tqdm import tqdm
 
 from caster_gym import Robot, load_robot
 from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.threads import get_threads, set_threads
 from scripts.mujoco_peer import joint_indices, mjcf
 
 ENVIRONMENT = "caster_gym:CasterTrack-v0"
@@ -182,11 +182,11 @@ def fresh(code: str) -> float:
 
 def rows(robot: Robot, name: str, seconds: float) -> list[Row]:
     """All measurements; those of compiled code say on how many cores."""
-    cores = min(2, numba.config.NUMBA_NUM_THREADS)
+    cores = min(2, get_threads())
 
     def on(threads: int, call: Callable[[], int]) -> Callable[[], float]:
         def measure() -> float:
-            numba.set_num_threads(threads)
+            set_threads(threads)
             return rate(call, seconds)
 
         return measure

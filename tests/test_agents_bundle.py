@@ -107,9 +107,7 @@ def test_the_actor_is_the_deterministic_policy_of_sb3(settings):
 
     SB3 rescales squashed actions to the bounds of the space and back, which rounds in float32.
     """
-    batch = CasterTrackVectorEnv(
-        4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor
-    )
+    batch = CasterTrackVectorEnv(4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor)
     learner = make_learner(settings, CasterVecEnv(batch), seed=1)
     seen = observations()
     expected, _ = learner.predict(seen, deterministic=True)
@@ -126,9 +124,7 @@ def test_the_actor_is_the_deterministic_policy_of_sb3(settings):
 def test_the_actor_keeps_weights_of_its_own():
     """Later training does not change a policy that was kept."""
     settings = PPOSettings(algorithm="ppo", hidden=HIDDEN, robots=4, horizon=8, batch=32)
-    batch = CasterTrackVectorEnv(
-        4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor
-    )
+    batch = CasterTrackVectorEnv(4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor)
     learner = make_learner(settings, CasterVecEnv(batch), seed=1)
     actor = actor_of(learner, settings)
     kept = {name: tensor.clone() for name, tensor in actor.state_dict().items()}
@@ -182,7 +178,7 @@ def test_a_missing_file_is_named(tmp_path):
 def test_another_format_is_refused(tmp_path, version):
     folder = saved(tmp_path)
     change_description(folder, format=version)
-    with pytest.raises(ConfigurationError, match="'?format'?.* (reads 1|should be)"):
+    with pytest.raises(ConfigurationError, match=r"'?format'?.* (reads 1|should be)"):
         load_bundle(folder)
 
 
@@ -250,9 +246,9 @@ def test_a_failure_while_saving_leaves_the_old_bundle(tmp_path, monkeypatch, fai
 def test_a_policy_is_refused_where_it_cannot_act():
     bundle = fresh_bundle()
     bundle.check_fits(LAYOUT)
-    with pytest.raises(ValueError, match="the policy drives roll_1, .* of 'chung2008', the task .* of 'tidybot2'"):
+    with pytest.raises(ValueError, match=r"the policy drives roll_1, .* of 'chung2008', the task .* of 'tidybot2'"):
         bundle.check_fits(ObservationLayout(load_robot("tidybot2"), TASK.preview))
-    with pytest.raises(ValueError, match="the policy drives .*, the task roll_1, steer_1, roll_2, steer_2 of"):
+    with pytest.raises(ValueError, match=r"the policy drives .*, the task roll_1, steer_1, roll_2, steer_2 of"):
         fewer = ROBOT.with_actuation(["roll_1", "steer_1", "roll_2", "steer_2"])
         bundle.check_fits(ObservationLayout(fewer, TASK.preview))
     with pytest.raises(ValueError, match=r"needs a preview of \(0\.1, 0\.2, 0\.4\) s, the task shows \(0\.1,\) s"):

@@ -53,8 +53,9 @@ def test_estimate_of_known_numbers():
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_claims():
-    """Normal data, 300 times. The percentile bootstrap of 40 values covers 93.5 % for 95 % and 88.7 % for 90 %:
-    its interval is √(39/40) as long and as if normal. 300 repetitions scatter by 1.4 and 1.8 %, of which four are given.
+    """Normal data, 300 times. A percentile bootstrap of 40 values takes the spread of the sample for that of the
+    normal law, √(39/40) of it: it covers 93.5 % for 95 % and 88.7 % for 90 %. Counting 300 scatters by 1.4 and 1.8 %,
+    of which four are given.
     """
     rng = np.random.default_rng(0)
     for confidence, expected, spread in ((0.95, 0.935, 0.057), (0.9, 0.887, 0.073)):

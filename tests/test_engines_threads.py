@@ -1,21 +1,21 @@
 """Blocks of robots shared out over threads."""
 
 import multiprocessing
+import subprocess
+import sys
 import threading
 
-import numba
 import pytest
 
-from caster_gym.engines.threads import BLOCKS_PER_THREAD, over_blocks
+from caster_gym.engines.threads import BLOCKS_PER_THREAD, get_threads, over_blocks, set_threads
 
 
 @pytest.fixture(params=[1, 2])
 def threads(request):
-    """So many threads, as far as the machine has them."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(min(request.param, numba.config.NUMBA_NUM_THREADS))
-    yield numba.get_num_threads()
-    numba.set_num_threads(before)
+    before = get_threads()
+    set_threads(request.param)
+    yield request.param
+    set_threads(before)
 
 
 @pytest.mark.parametrize("blocks", [1, 2 * BLOCKS_PER_THREAD - 1, 2 * BLOCKS_PER_THREAD, 101])
@@ -31,9 +31,34 @@ def test_every_block_is_done_once(threads, blocks):
 
 
 def test_many_blocks_go_to_as_many_threads_as_are_allowed(threads):
+    """Each waits for the others, so that none can do the work of two."""
+    together = threading.Barrier(threads, timeout=30)
     names = set()
-    over_blocks(lambda first, end: names.add(threading.current_thread().name), 100)
+
+    def meet(first, end):
+        together.wait()
+        names.add(threading.current_thread().name)
+
+    over_blocks(meet, 100)
     assert len(names) == threads
+
+
+def test_the_number_of_threads_is_positive():
+    with pytest.raises(ValueError, match="threads must be 1 or more, got 0"):
+        set_threads(0)
+
+
+def test_stepping_a_batch_leaves_the_pool_of_numba_asleep():
+    """It shares OpenMP's settings with Torch: once awake, training on one thread spins on as many as there are cores."""
+    code = (
+        "import numpy, caster_gym\n"
+        "from caster_gym.engines.numba_fleet import Fleet\n"
+        "from numba.np.ufunc import parallel\n"
+        "Fleet(caster_gym.load_robot('chung2008'), 300).step(numpy.zeros((300, 6)), 1e-3)\n"
+        "print(parallel._is_initialized)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_few_blocks_stay_in_the_calling_thread(threads):

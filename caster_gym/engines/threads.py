@@ -1,7 +1,8 @@
 """Compiled code on several cores: blocks of robots shared out over threads that release the interpreter's lock.
 
 Threads that sleep while they wait keep their speed beside other busy processes; spinning ones, as OpenMP's, then lose
-most of it. How many are used is `numba.get_num_threads()`, so that NUMBA_NUM_THREADS and numba.set_num_threads hold.
+most of it. How many are used is NUMBA_NUM_THREADS, else the number of cores, until `set_threads` is called. Numba's own
+pool is left alone: waking it would change the number of threads that Torch uses.
 """
 
 import os
@@ -9,16 +10,31 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numba
-
 BLOCKS_PER_THREAD = 4  # least, since waking a thread costs about as much as stepping so many blocks
 
+_count = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
 _pool: ThreadPoolExecutor | None = None
+
+
+def get_threads() -> int:
+    """Greatest number of threads that a batch is stepped with."""
+    return _count
+
+
+def set_threads(count: int) -> None:
+    """Step batches with so many threads at most. Raises ValueError for fewer than one."""
+    global _count, _pool
+    if count < 1:
+        raise ValueError(f"the number of threads must be 1 or more, got {count}")
+    if _pool is not None and count != _count:
+        _pool.shutdown()
+        _pool = None
+    _count = count
 
 
 def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> None:
     """function(first, end, *arguments) for ranges that cover all blocks, one range a thread."""
-    threads = min(numba.get_num_threads(), blocks // BLOCKS_PER_THREAD)
+    threads = min(_count, blocks // BLOCKS_PER_THREAD)
     if threads < 2:
         function(0, blocks, *arguments)
         return
@@ -32,7 +48,7 @@ def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> N
 def _threads() -> ThreadPoolExecutor:
     global _pool
     if _pool is None:
-        _pool = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="caster_gym")
+        _pool = ThreadPoolExecutor(_count, thread_name_prefix="caster_gym")
     return _pool
 
 
