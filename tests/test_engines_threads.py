@@ -49,7 +49,7 @@ def test_the_number_of_threads_is_positive():
 
 
 def test_stepping_a_batch_leaves_the_pool_of_numba_asleep():
-    """It shares OpenMP's settings with Torch: once awake, training on one thread spins on as many as there are cores."""
+    """It shares OpenMP's settings with Torch: once it is awake, training on one thread spins on all cores."""
     code = (
         "import numpy, caster_gym\n"
         "from caster_gym.engines.numba_fleet import Fleet\n"
