@@ -84,12 +84,12 @@ class SACSettings(Learner):
     """Soft actor-critic (Haarnoja et al., 2018), by Stable-Baselines3."""
 
     algorithm: Literal["sac"]
-    steps: PositiveInt = 600_000
+    steps: PositiveInt = 500_000
     learning_rate: PositiveFloat = 1e-3
     robots: PositiveInt = 32
-    batch: PositiveInt = 512
+    batch: PositiveInt = 256
     updates: PositiveInt = 4  # gradient steps for each control period of all robots
-    buffer: PositiveInt = 600_000  # transitions
+    buffer: PositiveInt = 500_000  # transitions
     first_random: PositiveInt = 10_000  # steps before learning starts
     soft_update: Fraction = 0.005
     entropy: PositiveFloat = 0.05  # coefficient to begin with; it is adapted
