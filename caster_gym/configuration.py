@@ -85,6 +85,10 @@ def parse_yaml(text: str, source: str) -> Any:
     """Value of a YAML text from a source that errors name."""
     try:
         return yaml.load(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise ConfigurationError(f"{source} cannot be read as YAML: {error.problem}{place}") from error
     except yaml.YAMLError as error:
         raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 

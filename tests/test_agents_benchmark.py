@@ -1,6 +1,7 @@
 """caster_gym.agents.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,7 +105,7 @@ def test_run_yaml_holds_what_the_comparison_was(finished, settings):
     facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
     assert BenchmarkSettings(**facts["benchmark"]) == settings
     assert {"versions", "command", "task", "robot"} <= set(facts)
-    controller, learner = settings.agents
+    controller, learner = (Path(agent).stem for agent in settings.agents)
     assert facts["agents"][learner]["steps"] == 512  # the change, not the file's
     assert facts["natural_frequencies"] == {controller: 15.0}
 

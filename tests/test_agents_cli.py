@@ -61,7 +61,7 @@ def test_each_command_explains_itself(call, command):
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (["train", "--set", "stepz=3"], "did you mean 'steps'?"),
         (["train", "--set", "steps=many"], "should be a whole number, got 'many'"),
-        (["train", "--set", "steps=["], "--set needs a value in YAML, got 'steps=['"),
+        (["train", "--set", "steps=["], "--set steps=[ cannot be read as YAML: expected the node content"),
     ],
 )
 def test_mistakes_get_one_sentence(call, tmp_path, arguments, message):
