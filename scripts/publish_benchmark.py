@@ -1,4 +1,4 @@
-"""Put the results of `make benchmark` where readers see them: docs/benchmark/ and the table in README.md."""
+"""Put the results of a comparison where readers see them: docs/benchmark/NAME/ and the table NAME in README.md."""
 
 import argparse
 import re
@@ -6,29 +6,31 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TABLE = re.compile(r"(<!-- table: begin -->\n).*?(<!-- table: end -->)", re.DOTALL)
-FILES = ("table.md", "summary.csv", "run.yaml", "overview.png", "paths.png", "errors.png", "torques.png")
+FILES = ("table.md", "summary.csv", "run.yaml", "overview.png", "paths.png", "errors.png", "torques.png", "learning.png")
 
 
-def publish(run: Path) -> None:
-    """Copy tables and figures of a finished comparison, and set the table between README's marks."""
-    missing = [name for name in FILES if not (run / name).is_file()]
+def publish(run: Path, name: str) -> None:
+    """Copy tables and figures of a finished comparison, and set its table between README's marks."""
+    missing = [file for file in FILES if not (run / file).is_file()]
     if missing:
         raise SystemExit(f"{run} lacks {', '.join(missing)}; run `make benchmark` first")
-    target = ROOT / "docs" / "benchmark"
+    target = ROOT / "docs" / "benchmark" / name
     target.mkdir(parents=True, exist_ok=True)
-    for name in (*FILES, "learning.png"):
-        if (run / name).is_file():
-            shutil.copyfile(run / name, target / name)
+    for file in FILES:
+        shutil.copyfile(run / file, target / file)
     readme = ROOT / "README.md"
-    text, table = readme.read_text(encoding="utf-8"), (run / "table.md").read_text(encoding="utf-8")
-    changed, count = TABLE.subn(lambda match: match[1] + table + match[2], text)
+    begin, end = f"<!-- table {name}: begin -->\n", f"<!-- table {name}: end -->"
+    between = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+    table = (run / "table.md").read_text(encoding="utf-8")
+    changed, count = between.subn(lambda _: begin + table + end, readme.read_text(encoding="utf-8"))
     if count != 1:
-        raise SystemExit("README.md must hold the marks <!-- table: begin --> and <!-- table: end --> once")
+        raise SystemExit(f"README.md must hold {begin.strip()} and {end} once")
     readme.write_text(changed, encoding="utf-8")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", type=Path, nargs="?", default=ROOT / "runs" / "benchmark", help="folder of a comparison")
-    publish(parser.parse_args().run)
+    parser.add_argument("name", nargs="?", default="track", help="name of the comparison, as in configs/benchmarks")
+    arguments = parser.parse_args()
+    publish(arguments.run, arguments.name)

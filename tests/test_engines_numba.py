@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import caster_gym
 from caster_gym import Model, load_robot
-from caster_gym.engines import numba_compiler
+from caster_gym.engines import numba_compiler, numba_fleet
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.numba_fleet import Fleet
 from caster_gym.engines.threads import BLOCKS_PER_THREAD
@@ -251,7 +250,7 @@ def package(tmp_path, monkeypatch):
     for folder in ("mechanics", "engines", "envs", "paths"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "one.py").write_text("x = 1\n")
-    monkeypatch.setattr(caster_gym, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(numba_compiler, "_PACKAGE", tmp_path)
     return tmp_path
 
 
@@ -279,3 +278,15 @@ def test_the_cache_goes_where_it_is_told_and_where_it_can(tmp_path, monkeypatch)
     (tmp_path / "file").write_text("no folder can be made in a file")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert numba_compiler._cache_root("") == Path(tempfile.gettempdir()) / "caster_gym"
+
+
+def test_compiling_is_announced_until_it_has_happened(package, monkeypatch, capsys):
+    monkeypatch.setattr(numba_compiler._SETTINGS, "CACHE_DIR", str(package / "cache"))
+    step = numba_fleet._compiled_step_blocks
+    numba_compiler.announce_compilation(step, "the fleet")
+    assert "caster_gym compiles the fleet, once on this machine" in capsys.readouterr().err
+    folder = package / "cache" / numba_compiler._source_digest() / "engines_0123"
+    folder.mkdir(parents=True)
+    (folder / f"numba_fleet.{step.__name__}-1.py311.nbi").touch()
+    numba_compiler.announce_compilation(step, "the fleet")
+    assert capsys.readouterr().err == ""

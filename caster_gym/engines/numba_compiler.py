@@ -8,6 +8,7 @@ strict IEEE, so that one robot alone and the same robot in a batch agree to the 
 import hashlib
 import math
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +19,6 @@ from typing import Any
 import numba
 from numba.extending import overload, register_jitable
 
-import caster_gym
 from caster_gym.mechanics import (
     actuation,
     caster,
@@ -32,6 +32,7 @@ from caster_gym.mechanics import (
     scalars,
 )
 
+_PACKAGE = Path(__file__).resolve().parent.parent
 INLINE: Any = {"forceinline": True}  # Numba names the type of its options in stubs only
 _SETTINGS: Any = numba.config  # makes its attributes at run time
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
@@ -50,6 +51,13 @@ def compiled(function: Callable[..., Any]) -> Any:
     """The function compiled at its first call, or read from the cache of an earlier process."""
     with _cache_folder():
         return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+
+
+def announce_compilation(function: Callable[..., Any], work: str) -> None:
+    """Say on stderr that compiling is ahead, unless the cache holds the compiled function already."""
+    pattern = f"*{function.__name__}-*.nbi"
+    if not any((_cache_root(_SETTINGS.CACHE_DIR) / _source_digest()).rglob(pattern)):
+        print(f"caster_gym compiles {work}, once on this machine; this takes about 20 s", file=sys.stderr)
 
 
 @contextmanager
@@ -78,9 +86,8 @@ def _cache_root(chosen: str) -> Path:
 def _source_digest() -> str:
     """Short hash of every source file whose code may be compiled."""
     digest = hashlib.sha256()
-    package = Path(caster_gym.__file__).parent
     for folder in ("mechanics", "engines", "envs"):
-        for file in sorted((package / folder).glob("*.py")):
+        for file in sorted((_PACKAGE / folder).glob("*.py")):
             digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
+from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import tracking_kernel as kernel
 from caster_gym.envs.observation import ObservationLayout
@@ -36,6 +37,7 @@ class TrackingEngine:
         self, robot: Robot, trajectories: Sequence[Trajectory], task: TrackTask, count: int, longest: int | None = None
     ) -> None:
         robot.check_time_step(task.time_step)
+        announce_compilation(kernel.restart, "the environment")
         self.robot, self.task, self.count = robot, task, count
         self.trajectories = tuple(trajectories)
         self.layout = ObservationLayout(robot, task.preview)
