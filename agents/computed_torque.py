@@ -68,12 +68,10 @@ class ComputedTorque:
         self.gains = gains(natural_frequency, period)
         self._model = known_model(layout.robot, known)
         robot = layout.robot
-        self._driven = [robot.joints.index(joint) for joint in robot.driven]
-        self._gears = np.array([caster.gear for caster in robot.casters])
+        driven = [robot.joints.index(joint) for joint in robot.driven]
         motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-        self._max_torque = np.array([motor.max_torque for motor in motors])[self._driven]
-        self._max_speed = np.array([motor.max_speed for motor in motors])[self._driven]
-        self._length = float(np.sqrt(np.mean([caster.x**2 + caster.y**2 for caster in robot.casters])))
+        self._max_torque = np.array([motor.max_torque for motor in motors])[driven]
+        self._max_speed = np.array([motor.max_speed for motor in motors])[driven]
 
     @property
     def name(self) -> str:
@@ -87,12 +85,11 @@ class ComputedTorque:
         steering = np.arctan2(cos_sin[..., 1], cos_sin[..., 0])
         twist = see(observations, "twist")
         force = self._model.inverse_dynamics(steering, twist, self._twist_rate(observations, twist))
-        rows = self._motor_rows(steering)
-        speeds = np.einsum("rmi,ri->rm", rows, twist)
+        b = self._model.motor_wrenches(steering)
+        speeds = (twist[:, None] @ b)[:, 0] / self._max_torque  # a motor's wrench and its speed have the same row
         low, high = torque_range(speeds, np.ones_like(speeds), self._max_speed)
-        b = rows.mT * self._max_torque
-        b[:, 2] /= self._length
-        force[:, 2] /= self._length
+        b[:, 2] /= self._model.characteristic_length
+        force[:, 2] /= self._model.characteristic_length
         return distribute(b, force, low, high).astype(np.float32)
 
     def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
@@ -117,9 +114,3 @@ class ComputedTorque:
         later = self.layout.physical(observations, f"preview_{horizon:g}s")[:, 4:]
         jerk = 2.0 * (later - velocity - horizon * now) / horizon**2
         return now + 0.5 * self.period * jerk
-
-    def _motor_rows(self, steering: Array) -> Array:
-        """Rows (robots, driven, 3) that give the driven motors' speeds from the twist."""
-        joints = self._model.jacobian(steering).reshape(len(steering), -1, 2, 3)
-        motors: Array = (self._gears @ joints).reshape(len(steering), -1, 3)
-        return motors[:, self._driven]

@@ -6,7 +6,16 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = ("table.md", "summary.csv", "run.yaml", "overview.png", "paths.png", "errors.png", "torques.png", "learning.png")
+FILES = (
+    "table.md",
+    "summary.csv",
+    "run.yaml",
+    "overview.png",
+    "paths.png",
+    "errors.png",
+    "torques.png",
+    "learning.png",
+)
 
 
 def publish(run: Path, name: str) -> None:

@@ -83,3 +83,14 @@ def test_characteristic_length_is_the_mean_distance_of_the_pivots():
     robot = random_robot(95, 4)
     expected = np.sqrt(np.mean([caster.x**2 + caster.y**2 for caster in robot.casters]))
     assert_allclose(characteristic_length(robot_parameters(robot)), expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("driven", ["all", ("steer_1", "roll_2", "steer_2")])
+def test_model_gives_the_wrenches_of_its_driven_motors(driven):
+    """Columns in the order of the driven joints, equal to gear and Jacobian by hand up to rounding; batch axes lead."""
+    robot = random_robot(92, 3).with_actuation(driven)
+    model = Model(robot)
+    steering, _, _, _ = random_motion(92, robot, 4)
+    expected = [wrench_matrix(model, angles) * [[1.0], [1.0], [model.characteristic_length]] for angles in steering]
+    assert_allclose(model.motor_wrenches(steering), expected, rtol=1e-12, atol=1e-12)
+    assert_allclose(model.motor_wrenches(steering[0]), expected[0], rtol=1e-12, atol=1e-12)

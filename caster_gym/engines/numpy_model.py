@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
-from caster_gym.mechanics.scalars import Direction, Vector, each, pairs
+from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
 from caster_gym.robot import Robot, check_joints
 
 Array = NDArray[np.float64]
@@ -95,6 +95,17 @@ class Model:
     def wheel_loads(self, steering: ArrayLike) -> Array:
         """Normal forces (..., N) under the wheels of the robot at rest. [N]"""
         return self._stack(ground.wheel_loads(self._directions(steering), self._parameters))
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes moments comparable with forces: root mean square distance of the pivots from C. [m]"""
+        return float(actuation.characteristic_length(self._parameters))
+
+    def motor_wrenches(self, steering: ArrayLike) -> Array:
+        """Wrenches (..., 3, driven) at C, in B, of the driven motors, each at its greatest torque. [N, N, N m]"""
+        pairs_of = each(actuation.motor_wrenches, (), self._directions(steering), self._parameters.casters)
+        wrenches = dict(zip(self.robot.joints, flatten(pairs_of), strict=True))
+        return self._stack([self._stack(wrenches[joint]) for joint in self.robot.driven])
 
     def conditioning(self, steering: ArrayLike) -> Array:
         """σ_min / σ_max (...) of the wrenches of the driven motors; 0 where they cannot push the robot somewhere."""
