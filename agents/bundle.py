@@ -52,13 +52,17 @@ class Bundle:
         self.description = description
         self.agent = LearnedAgent(actor, description.name)
 
-    def check_fits(self, layout: ObservationLayout) -> None:
-        """Raises ValueError if the policy cannot act on observations of that layout."""
+    def check_fits(self, layout: ObservationLayout, period: float) -> None:
+        """Raises ValueError if the policy cannot act on observations of that layout, every period [s]."""
         ours = self.description.layout
         if ours.robot.joints != layout.robot.joints or ours.robot.driven != layout.robot.driven:
             raise ValueError(
                 f"the policy drives {', '.join(ours.robot.driven)} of {ours.robot.name!r}, "
                 f"the task {', '.join(layout.robot.driven)} of {layout.robot.name!r}"
+            )
+        if self.description.task.control_period != period:
+            raise ValueError(
+                f"the policy acts every {self.description.task.control_period:g} s, the task every {period:g} s"
             )
         if ours.preview != layout.preview:
             raise ValueError(f"the policy needs a preview of {ours.preview} s, the task shows {layout.preview} s")

@@ -25,6 +25,8 @@ app = typer.Typer(
     help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
 )
 
+MARK = ".caster-gym"  # stands in each folder that --overwrite may delete
+
 Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
 Changes = Annotated[
@@ -38,7 +40,7 @@ TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or
 def train(
     agent: Annotated[str, typer.Argument(help="Name of an agent in configs/agents, or path of a YAML file.")] = "ppo",
     task: TaskName = "track",
-    seed: Annotated[int, typer.Option(help="Seed of networks, exploration and training paths.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of networks, exploration and starts.", min=0, max=2**32 - 1)] = 0,
     out: Out = Path("runs/train"),
     overwrite: Overwrite = False,
     change: Changes = None,
@@ -89,7 +91,7 @@ def evaluate(
         test = test_batch(tasks, tasks.test, starts)
         if Path(policy).is_dir():
             bundle = load_bundle(Path(policy))
-            bundle.check_fits(test.engine.layout)
+            bundle.check_fits(test.engine.layout, test.task.control_period)
             contender = Contender(bundle.agent.name, bundle.agent, None)
         else:
             known = read_agent(policy)
@@ -97,7 +99,7 @@ def evaluate(
                 raise ValueError(f"agent {policy!r} must be trained first: give the folder of its policy")
             controller, _ = tune(known, test_batch(tasks, tasks.validation, starts=1))
             contender = Contender(controller.name, controller, None)
-        _prepare(out, overwrite)
+        _prepare(out, overwrite, kept=Path(policy))
         results, episodes = compare([contender], test, settings)
         text = table(results, settings.confidence)
         write_episodes(out / "episodes.csv", results)
@@ -138,13 +140,19 @@ def _parsed(changes: list[str] | None) -> dict[str, Any]:
     return parsed
 
 
-def _prepare(folder: Path, overwrite: bool) -> None:
-    """An empty folder; refuses to touch one that holds something, unless told to."""
+def _prepare(folder: Path, overwrite: bool, kept: Path | None = None) -> None:
+    """An empty folder with our mark; a full one is emptied only if told to, if it has the mark, and without `kept`."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         if not overwrite:
             raise ValueError(f"{folder} is not empty; choose another --out, or --overwrite it")
-        shutil.rmtree(folder) if folder.is_dir() else folder.unlink()
+        if not (folder / MARK).is_file():
+            raise ValueError(f"{folder} is not overwritten, since it does not hold results of caster-gym alone")
+        for place in (Path.cwd(), *([kept] if kept else [])):
+            if place.resolve().is_relative_to(folder.resolve()):
+                raise ValueError(f"{folder} is not overwritten, since {place} lies in it")
+        shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / MARK).touch()
 
 
 @contextmanager
@@ -152,7 +160,7 @@ def _plain_errors() -> Iterator[None]:
     """Errors of the user's making as one sentence, and a quiet end on Ctrl-C."""
     try:
         yield
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         typer.echo(f"caster-gym: {error}", err=True)
         raise typer.Exit(2) from error
     except KeyboardInterrupt:

@@ -5,15 +5,17 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 
 from .computed_torque import KnownModel
 
+Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
 
@@ -104,28 +106,23 @@ class ComputedTorqueSettings(Frozen):
     natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
 
 
-LearnerSettings: TypeAlias = Annotated[PPOSettings | SACSettings, Field(discriminator="algorithm")]
-AgentSettings: TypeAlias = Annotated[
-    PPOSettings | SACSettings | ComputedTorqueSettings, Field(discriminator="algorithm")
-]
-
-
-class NamedAgent(Frozen):
-    """Wraps an agent's settings, so that a file of its own can be read."""
-
-    agent: AgentSettings
-
-
 class BenchmarkSettings(Frozen):
     """Which agents are compared, and how."""
 
     task: str = "track"  # name of a file in configs/tasks, or path of one
     agents: Annotated[tuple[str, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
-    seeds: Annotated[tuple[int, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
     starts: PositiveInt = 1  # episodes on each test path, with different starts
-    start_seed: int = 1000  # the same starts for every agent
+    start_seed: Seed = 1000  # the same starts for every agent
     settling: PositiveFloat = 2.0  # [s] what comes before counts as transient
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+
+    @field_validator("seeds")
+    @classmethod
+    def _seeds_differ(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        if len(set(seeds)) < len(seeds):
+            raise ValueError(f"must differ from one another, got {list(seeds)}")
+        return seeds
 
 
 Settings = TypeVar("Settings", bound=BaseModel)
@@ -156,4 +153,12 @@ def read_agent(
     """Checked settings of an agent, with some fields changed."""
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}
-    return parse(NamedAgent, {"agent": content}, str(path)).agent
+    kinds: dict[str, type[PPOSettings | SACSettings | ComputedTorqueSettings]] = {
+        "ppo": PPOSettings,
+        "sac": SACSettings,
+        "computed torque": ComputedTorqueSettings,
+    }
+    algorithm = content.get("algorithm")
+    if algorithm not in kinds:
+        raise ConfigurationError(f"{path}: {unknown_name('algorithm', algorithm, kinds)}")
+    return parse(kinds[algorithm], content, str(path))

@@ -5,10 +5,11 @@ PyYAML reads `3e-4` and `1e6` as strings; here they are numbers, as everywhere e
 
 import difflib
 import re
+import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, NamedTuple, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
@@ -89,7 +90,7 @@ def parse_yaml(text: str, source: str) -> Any:
         mark = error.problem_mark
         place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         raise ConfigurationError(f"{source} cannot be read as YAML: {error.problem}{place}") from error
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
         raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 
 
@@ -174,8 +175,14 @@ _PLAIN = {  # for what pydantic says in terms of Python
 }
 
 
+_BRIEF = reprlib.Repr()
+_BRIEF.maxlevel = 3
+_BRIEF.maxtuple = _BRIEF.maxlist = _BRIEF.maxdict = _BRIEF.maxset = 8
+_BRIEF.maxstring = _BRIEF.maxother = LONGEST_VALUE
+
+
 def _shortened(value: object) -> str:
-    text = repr(value)
+    text = _BRIEF.repr(value)  # a value may be far larger than its file, by aliases
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
 
 
@@ -241,4 +248,7 @@ def _is_model(annotation: Any) -> bool:
 
 def _goes_by(model: type[BaseModel], name: str) -> bool:
     """Is a member of a union known by this name, that of its class or the default of its discriminator?"""
-    return model.__name__ == name or any(field.default == name for field in model.model_fields.values())
+    return model.__name__ == name or any(
+        field.default == name or (get_origin(field.annotation) is Literal and name in get_args(field.annotation))
+        for field in model.model_fields.values()
+    )

@@ -195,7 +195,7 @@ def load_robot(name: str | Path | Robot) -> Robot:
     """A robot that comes with the package, by its name, or one from a YAML file of your own."""
     if isinstance(name, Robot):
         return name
-    path = Path(name)
+    path = Path(name).expanduser()
     if path.suffix not in (".yaml", ".yml"):
         folder = Path(str(files("caster_gym.configs"))) / "robots"
         path = folder / f"{name}.yaml"

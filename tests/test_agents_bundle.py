@@ -245,11 +245,13 @@ def test_a_failure_while_saving_leaves_the_old_bundle(tmp_path, monkeypatch, fai
 
 def test_a_policy_is_refused_where_it_cannot_act():
     bundle = fresh_bundle()
-    bundle.check_fits(LAYOUT)
+    bundle.check_fits(LAYOUT, TASK.control_period)
     with pytest.raises(ValueError, match=r"the policy drives roll_1, .* of 'chung2008', the task .* of 'tidybot2'"):
-        bundle.check_fits(ObservationLayout(load_robot("tidybot2"), TASK.preview))
+        bundle.check_fits(ObservationLayout(load_robot("tidybot2"), TASK.preview), TASK.control_period)
     with pytest.raises(ValueError, match=r"the policy drives .*, the task roll_1, steer_1, roll_2, steer_2 of"):
         fewer = ROBOT.with_actuation(["roll_1", "steer_1", "roll_2", "steer_2"])
-        bundle.check_fits(ObservationLayout(fewer, TASK.preview))
+        bundle.check_fits(ObservationLayout(fewer, TASK.preview), TASK.control_period)
     with pytest.raises(ValueError, match=r"needs a preview of \(0\.1, 0\.2, 0\.4\) s, the task shows \(0\.1,\) s"):
-        bundle.check_fits(ObservationLayout(ROBOT, (0.1,)))
+        bundle.check_fits(ObservationLayout(ROBOT, (0.1,)), TASK.control_period)
+    with pytest.raises(ValueError, match=r"acts every 0\.02 s, the task every 0\.01 s"):
+        bundle.check_fits(LAYOUT, 0.01)

@@ -6,7 +6,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from caster_gym.agents.cli import app
+from caster_gym.agents.cli import MARK, app
 
 RANDOM = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3}
 TASK = {
@@ -96,15 +96,32 @@ def test_results_are_not_overwritten(call, tmp_path, command):
 def test_overwrite_begins_with_an_empty_folder(call, tmp_path):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "old.txt").write_text("old", encoding="utf-8")
+    (tmp_path / "results" / MARK).touch()
     result = call("evaluate", "computed_torque", "--task", "task.yaml", "--out", "results", "--overwrite")
     assert result.exit_code == 0, result.output
     assert not (tmp_path / "results" / "old.txt").exists()
     assert (tmp_path / "results" / "table.md").is_file()
 
 
+def test_only_folders_of_results_are_overwritten(call, tmp_path, monkeypatch):
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "precious.txt").write_text("a week of work", encoding="utf-8")
+    arguments = ["evaluate", "computed_torque", "--task", "task.yaml", "--overwrite", "--out"]
+    assert_refused(call(*arguments, "home"), "does not hold results of caster-gym alone")
+    (tmp_path / MARK).touch()
+    assert_refused(call(*arguments, "."), f"{tmp_path} lies in it")
+    assert (tmp_path / "home" / "precious.txt").is_file()
+
+
+def test_a_file_in_the_way_is_told_in_a_sentence(call, tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert_refused(call("train", *TINY, "--task", "task.yaml", "--out", "file/run"), "Not a directory")
+
+
 def test_a_mistake_is_found_before_anything_is_deleted(call, tmp_path):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "precious.txt").write_text("a week of work", encoding="utf-8")
+    (tmp_path / "results" / MARK).touch()
     for arguments in (
         ["train", "nobody"],
         ["evaluate", "nobody"],

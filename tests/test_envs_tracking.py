@@ -158,8 +158,10 @@ def simulated(m):
         torque = np.clip(command.reshape(-1, 2) * most, low, high)
         joints = np.einsum("nij,ni->nj", gear, torque).ravel()
         torques.append(torque.ravel())
-        powers.append((torque * speed).sum())
         now = model.simulate(now, joints, m.env.task.time_step, 1)[-1]
+        _, theta, delta = model.rates(now[6:], now[3:6])
+        after = np.einsum("nij,nj->ni", gear, np.stack((theta, delta), -1))
+        powers.append((torque * (speed + after)).sum() / 2.0)
     return now, np.mean(torques, axis=0), np.mean(powers)
 
 

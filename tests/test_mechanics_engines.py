@@ -35,6 +35,7 @@ def calls(robot, seed, count=None):
         "kinetic_energy": (steering, twist),
         "ground_forces": (steering, twist, torque),
         "wheel_loads": (steering,),
+        "motor_wrenches": (steering,),
         "conditioning": (steering,),
         "collide": (steering, twist, point, normal, e, mu),
         "simulate": (state, torque, STEP, 5),

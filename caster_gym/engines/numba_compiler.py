@@ -114,7 +114,13 @@ def _add(a: Any, b: Any) -> Any:
 def _total(terms: Any) -> Any:
     if len(terms) == 1:
         return lambda terms: terms[0]
-    return lambda terms: scalars.add(scalars.total(terms[:-1]), terms[-1])
+    if len(terms) < 5:
+        return lambda terms: scalars.add(scalars.total(terms[:-1]), terms[-1])
+    return (
+        lambda terms: scalars.add(  # four at a time, since the compiler's recursion is limited
+            scalars.add(scalars.add(scalars.add(scalars.total(terms[:-4]), terms[-4]), terms[-3]), terms[-2]), terms[-1]
+        )
+    )
 
 
 @overload(scalars.greatest, jit_options=INLINE, strict=False)

@@ -1,5 +1,6 @@
 """The bare mechanics of many robots at once, compiled."""
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -104,6 +105,9 @@ class Fleet:
 
     def step(self, torque: ArrayLike, dt: float, steps: int = 1) -> None:
         """RK4 steps of dt seconds under joint torques (count, 2 N) [N m]: roll_1, steer_1, roll_2, …"""
+        steps = operator.index(steps)
+        if steps < 0:
+            raise ValueError(f"steps must be 0 or more, got {steps}")
         for robot in self._distinct:
             robot.check_time_step(dt)
         to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)

@@ -1,5 +1,6 @@
 """The mechanics on NumPy arrays."""
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,6 +32,8 @@ class Model:
     _arrays: Any = np
 
     def __init__(self, robot: Robot, dynamics: Dynamics = "exact", parameters: RobotParameters | None = None) -> None:
+        if not isinstance(robot, Robot):
+            raise TypeError(f"robot must be a Robot, such as caster_gym.load_robot gives, got {robot!r}")
         self.robot = robot
         self.dynamics = dynamics
         self._parameters = robot_parameters(robot, dynamics) if parameters is None else parameters
@@ -143,6 +146,7 @@ class Model:
         Angles are continuous in time. Raises ValueError if dt [s] cannot follow the casters.
         """
         self.robot.check_time_step(dt)
+        steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
         x, y, beta, *others = self._components("state", state, 6 + self.robot.caster_count)

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space
+from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space, refuse_rendering
 from caster_gym.envs.tracking_engine import DRAW_A_PATH, info_of_one
 
 Observation = NDArray[np.float32]
@@ -71,7 +71,8 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.robot, self.task = self.engine.robot, self.engine.task
         self.observation_space = observation_space(self.engine)
         self.action_space = action_space(self.engine)
-        self.render_mode = render_mode
+        refuse_rendering(render_mode)
+        self.render_mode = None
         self._started = False
 
     def reset(

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space
+from caster_gym.envs.setup import PathLike, RobotLike, action_space, make_engine, observation_space, refuse_rendering
 from caster_gym.envs.tracking_engine import DRAW_A_PATH, Outcome, info_of
 
 Observations = NDArray[np.float32]
@@ -50,7 +50,8 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
         self.robot, self.task = self.engine.robot, self.engine.task
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
+        refuse_rendering(render_mode)
+        self.render_mode = None
         self.single_observation_space = observation_space(self.engine)
         self.single_action_space = action_space(self.engine)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -68,7 +69,7 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
         options["path"] chooses trajectories by their index in the pool: one for all, or an array (num_envs,).
         """
         mask = self._mask(options)
-        path = np.broadcast_to(self.engine.checked_path((options or {}).get("path", DRAW_A_PATH)), self.num_envs)
+        path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
         selected = np.flatnonzero(mask)
         for robot, chosen in zip(selected.tolist(), np.array(self._seeds(seed), dtype=object)[mask], strict=True):
             if chosen is not None or self._generators[robot] is None:

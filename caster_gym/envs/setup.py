@@ -54,3 +54,9 @@ def observation_space(engine: TrackingEngine) -> "Box[np.float32]":
 def action_space(engine: TrackingEngine) -> "Box[np.float32]":
     """Space of one robot's action: a share of its greatest torque for each driven motor."""
     return Box(-1.0, 1.0, (len(engine.robot.driven),), np.float32)
+
+
+def refuse_rendering(render_mode: str | None) -> None:
+    """Raises ValueError for any render mode, since there is none yet."""
+    if render_mode is not None:
+        raise ValueError(f"render_mode must be None, since this environment draws nothing, got {render_mode!r}")

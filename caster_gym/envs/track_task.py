@@ -1,20 +1,26 @@
 """The parameters of the tracking task."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, TypeAlias
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen, parse
 from caster_gym.envs.tracking import Weights
+
+Horizon: TypeAlias = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
 class TrackTask(Frozen):
     """How a timed trajectory is to be followed, and what that is worth."""
 
-    control_period: PositiveFloat = 0.02  # [s] between actions
-    substeps: PositiveInt = 4  # RK4 steps in a control period
-    preview: tuple[PositiveFloat, ...] = (0.1, 0.2, 0.4)  # [s] horizons at which the coming trajectory is shown
+    control_period: Annotated[float, Field(ge=1e-5, le=1.0)] = 0.02  # [s] between actions
+    substeps: Annotated[int, Field(gt=0, le=1000)] = 4  # RK4 steps in a control period
+    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
+        0.1,
+        0.2,
+        0.4,
+    )  # [s] horizons at which the coming trajectory is shown
     corridor: PositiveFloat = 0.5  # [m] position error that ends an episode
     start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
@@ -30,6 +36,8 @@ class TrackTask(Frozen):
 
     @model_validator(mode="after")
     def _horizons_are_periods(self) -> Self:
+        if list(self.preview) != sorted(set(self.preview)):
+            raise ValueError(f"preview horizons must rise from one to the next, got {list(self.preview)}")
         for horizon in self.preview:
             steps = horizon / self.control_period
             if steps < 0.5 or abs(steps - round(steps)) > 1e-6:

@@ -77,16 +77,17 @@ class TrackingEngine:
 
         path: index of the trajectory to follow, for all or for each of the selected; DRAW_A_PATH draws one.
         """
-        wanted = self.checked_path(path)
         outcome = self._empty() if into is None else into
         views = kernel.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
-        paths = np.broadcast_to(wanted, selected.shape).copy()
+        paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         kernel.restart(selected, paths, self._world, self._spread, views, self._casters, self._preview)
         return outcome
 
     def checked_path(self, path: Any) -> NDArray[np.int64]:
-        """Indices of trajectories as an array. Raises ValueError for one that is not there or no whole number."""
+        """Indices of trajectories, one a robot. Raises ValueError for one that is not there or no whole number."""
         wanted = np.asarray(path)
+        if wanted.shape not in ((), (self.count,)):
+            raise ValueError(f"path must be one number or an array of shape ({self.count},), got shape {wanted.shape}")
         if (
             wanted.dtype.kind not in "iu"
             or wanted.size == 0
@@ -94,7 +95,7 @@ class TrackingEngine:
             or wanted.max() >= len(self.trajectories)
         ):
             raise ValueError(f"path must be a whole number in 0 … {len(self.trajectories) - 1}, got {path!r}")
-        return wanted.astype(np.int64)
+        return np.broadcast_to(wanted.astype(np.int64), (self.count,))
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
         """Move all robots for one control period under actions (robots, driven joints) in −1 … 1."""

@@ -13,21 +13,28 @@ class Drive(NamedTuple):
     """What the motors did during a time step."""
 
     torques: tuple[tuple[Scalar, Scalar], ...]  # of each caster's two motors [N m]
-    power: Scalar  # mechanical power of all motors at the step's start [W]
+    power: Scalar  # mean mechanical power of all motors [W]
 
 
-def motor_power(torques: tuple[Scalar, Scalar], speeds: tuple[Scalar, Scalar]) -> tuple[Scalar]:
-    """Mechanical power of a caster's two motors. [W]"""
-    return (torques[0] * speeds[0] + torques[1] * speeds[1],)
+def motor_power(
+    torques: tuple[Scalar, Scalar], before: tuple[Scalar, Scalar], after: tuple[Scalar, Scalar]
+) -> tuple[Scalar]:
+    """Mean mechanical power of a caster's two motors between their speeds before and after a step. [W]"""
+    return (0.5 * (torques[0] * (before[0] + after[0]) + torques[1] * (before[1] + after[1])),)
+
+
+def all_motor_speeds(state: State, robot: RobotParameters) -> tuple[tuple[Scalar, Scalar], ...]:
+    """Speeds of each caster's two motors. [rad/s]"""
+    rates = each(joint_rates, (state.twist,), state.directions, robot.casters)
+    return each(motor_speeds, (), rates, robot.casters)
 
 
 def driven_step(
     state: State, commands: tuple[tuple[Scalar, Scalar], ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[State, Drive]:
     """One RK4 step of h seconds under motor commands in −1 … 1, limited at the speeds of the step's start."""
-    rates = each(joint_rates, (state.twist,), state.directions, robot.casters)
-    speeds = each(motor_speeds, (), rates, robot.casters)
-    torques = each(motor_torques, (), commands, speeds, robot.casters)
-    power = total(each(motor_power, (), torques, speeds))
-    at_joints = each(joint_torques, (), torques, robot.casters)
-    return rk4_step(state, at_joints, wrench, h, robot), Drive(torques, power[0])
+    before = all_motor_speeds(state, robot)
+    torques = each(motor_torques, (), commands, before, robot.casters)
+    end = rk4_step(state, each(joint_torques, (), torques, robot.casters), wrench, h, robot)
+    (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot)))
+    return end, Drive(torques, power)

@@ -4,10 +4,10 @@ A path is drawn as the direction θ of its tangent and the speed v along it, bot
 defined everywhere, at rest and where it reverses too. Position is the integral of v exp(iθ).
 """
 
-from typing import Literal, Self, get_args
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
-from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from caster_gym.configuration import Frozen
 from caster_gym.paths.trajectory import Array, Plane, Trajectory, place, rest_to_rest, tabulate, whole_steps
@@ -24,7 +24,7 @@ class RandomPaths(Frozen):
     """Random paths from the centre, at rest at both ends. Path k is the same for every count."""
 
     shape: Literal["random_paths"] = "random_paths"
-    count: PositiveInt = 16
+    count: Annotated[int, Field(gt=0, le=100_000)] = 16
     seed: NonNegativeInt = 0
     duration: PositiveFloat = 10.0  # [s] of each
     extent: PositiveFloat = 3.0  # [m] greatest distance from the start

@@ -14,6 +14,7 @@ Plane = NDArray[np.complex128]
 COLUMNS = ("x", "y", "cos", "sin", "vx", "vy", "omega", "ax", "ay", "alpha")
 MOST_TURN = 1.0  # [rad] of the heading in one time step
 LEAST_STEPS = 10  # fewer samples do not show a motion that starts and ends at rest
+MOST_STEPS = 1_000_000  # beyond, a table would fill the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,11 @@ def check_time_step(time_step: float) -> None:
 def whole_steps(duration: float, time_step: float) -> int:
     """Number of time steps nearest to a duration [s]."""
     check_time_step(time_step)
+    if duration > MOST_STEPS * time_step:
+        raise ValueError(
+            f"a duration of {duration:g} s is more than {MOST_STEPS} time steps of {time_step:g} s; "
+            f"at most {MOST_STEPS * time_step:g} s would do"
+        )
     steps = round(duration / time_step)
     if steps < LEAST_STEPS:
         raise ValueError(
