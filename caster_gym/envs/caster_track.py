@@ -46,6 +46,19 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     | effort | −0.02 times the mean square of torques as shares of their limits | −0.02 … 0 |
     | alive | 0.02, so that no step is worth less than none | 0.02 |
 
+    **Info**, after reset and step alike; arrays have the robots in front in a batch:
+
+    | key | meaning | unit |
+    |---|---|---|
+    | position_error, heading_error | distance to the reference; reference heading minus robot heading | m, rad |
+    | reward_terms | the terms above, by name | – |
+    | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
+    | power | mean mechanical power of all motors over the control period | W |
+    | traction_use | largest share of the floor's friction that a wheel uses; above 1 it would slip | – |
+    | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |
+    | pose, reference_pose | x, y, cos β, sin β in W | m, – |
+    | left_corridor, not_finite | why an episode has terminated | bool |
+
     **Endings** `terminated`: the robot left its corridor (0.5 m from the reference) or its state stopped being finite,
     as `info["left_corridor"]` and `info["not_finite"]` tell; all terms of that step are 0. `truncated`: the trajectory
     is over. Success does not end an episode.
