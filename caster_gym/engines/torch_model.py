@@ -45,4 +45,5 @@ class TorchModel(Model):
 
     def _stack(self, parts: Any, axis: int = -1) -> Any:
         tensors = [torch.as_tensor(part, dtype=self.dtype, device=self.device) for part in parts]
-        return torch.stack(torch.broadcast_tensors(*tensors), axis)  # type: ignore[no-untyped-call]  # untyped in Torch
+        # Torch ships this one function without types
+        return torch.stack(torch.broadcast_tensors(*tensors), axis)  # type: ignore[no-untyped-call]

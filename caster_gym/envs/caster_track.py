@@ -70,7 +70,8 @@ class CasterTrackEnv(gym.Env[Observation, NDArray[np.float32]]):
     fields of `caster_gym.envs.track_task.TrackTask`, which holds the numbers above; unknown ones are errors.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # declared so by Gymnasium
+    # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
 
     def __init__(
         self,

@@ -24,7 +24,8 @@ class CasterTrackVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[
     before their trajectory ends. All other arguments are those of `CasterTrackEnv`.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012  # declared so by Gymnasium
+    # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": [],
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }

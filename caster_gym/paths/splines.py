@@ -24,7 +24,8 @@ class Spline(Shape):
     waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=2)]  # (x, y) [m] or (x, y, heading) [m, m, rad]
     file: Annotated[str | None, Field(exclude=True)] = None  # CSV with the header x,y or x,y,heading; read at once
     closed: bool = False  # back to the first waypoint, which is not repeated
-    heading: Heading | None = None  # type: ignore[assignment]  # None: the waypoints' headings, else the tangent
+    # None: the waypoints' headings, else the tangent; wider than the field of Shape, which `turn` below makes good
+    heading: Heading | None = None  # type: ignore[assignment]
 
     @model_validator(mode="before")
     @classmethod
