@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
+from numba import types
+from numba.extending import overload, register_jitable
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
 from caster_gym.engines.lanes import (
     BODY_ROWS,
     LANES,
@@ -21,37 +23,112 @@ from caster_gym.engines.lanes import (
 )
 from caster_gym.engines.numba_compiler import INLINE, compiled
 from caster_gym.engines.threads import over_blocks
+from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import pack_state, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, pack_parameters, robot_parameters
+from caster_gym.mechanics.separation import NO_HULL, Hull, Obstacles, Surroundings, clearance
 from caster_gym.robot import Robot
 
 
 @register_jitable(**INLINE)
-def _step_lanes(block: Any, lanes: int, steps: int, h: float, casters: tuple[int, ...]) -> None:
-    """RK4 steps of the first robots of one block, whose rows are state, joint torques and parameters."""
-    torque_row = BODY_ROWS + 2 * len(casters)
-    parameter_row = torque_row + 2 * len(casters)
-    for _ in range(steps):
+def torque_row(casters: Any) -> int:
+    """First row of the joint torques."""
+    return BODY_ROWS + 2 * len(casters)
+
+
+@register_jitable(**INLINE)
+def room_row(casters: Any) -> int:
+    """Row of the room; negative while the coming step is to be taken with care. Parameters follow."""
+    return torque_row(casters) + 2 * len(casters)
+
+
+@register_jitable(**INLINE)
+def _step_lanes(block: Any, lanes: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
+    """One RK4 step of the first robots of one block."""
+    row = room_row(casters)
+    _measure(block, lanes, h, hull, obstacles, casters)
+    for lane in range(lanes):
+        state = read_state(block, lane, 0, casters)
+        torques = read_pairs(block, lane, torque_row(casters), casters)
+        robot = read_robot(block, lane, row + 1, casters)
+        target = rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)
+        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, hull.reach)
+        write(block, lane, 0, end)
+        block[row * LANES + lane] = room
+    _take_care(block, lanes, h, hull, obstacles, casters)
+
+
+def _measure(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+    """Measure the room of robots that may soon need to know it."""
+    raise NotImplementedError
+
+
+def _take_care(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+    """Step the robots that may touch something."""
+    raise NotImplementedError
+
+
+@overload(_measure, jit_options=INLINE, strict=False)
+def _measure_compiled(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> Any:
+    if isinstance(obstacles, types.NoneType):
+        return lambda block, lanes, h, hull, obstacles, casters: None
+
+    def among(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+        row = room_row(casters)
         for lane in range(lanes):
             state = read_state(block, lane, 0, casters)
-            torques = read_pairs(block, lane, torque_row, casters)
-            robot = read_robot(block, lane, parameter_row, casters)
-            write(block, lane, 0, pack_state(rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)))
+            if worth_measuring(block[row * LANES + lane], state.twist, h, hull.reach):
+                gap = clearance(state.position, state.heading, hull, obstacles, 0, len(obstacles.radii))
+                block[row * LANES + lane] = gap
+
+    return among
 
 
-def _step_block(block: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
-    _step_lanes(block, LANES, steps, h, casters)
+@overload(_take_care, jit_options=INLINE, strict=False)
+def _take_care_compiled(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> Any:
+    if isinstance(obstacles, types.NoneType):
+        return lambda block, lanes, h, hull, obstacles, casters: None
+
+    def among(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+        for lane in range(lanes):
+            if block[room_row(casters) * LANES + lane] < 0.0:
+                _compiled_careful_step(block, lane, h, hull, obstacles, casters)
+
+    return among
 
 
-def _step_one(blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
-    _step_lanes(blocks[0], 1, steps, h, casters)
+def _careful_step(block: Any, lane: int, h: float, hull: Hull, obstacles: Obstacles, casters: tuple[int, ...]) -> None:
+    """One step of a robot that may touch something."""
+    hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
+    row, count = room_row(casters), len(obstacles.radii)
+    state = read_state(block, lane, 0, casters)
+    torques = read_pairs(block, lane, torque_row(casters), casters)
+    robot = read_robot(block, lane, row + 1, casters)
+    state, _ = guarded_step(state, torques, (0.0, 0.0, 0.0), h, robot, hull, obstacles, 0, count)
+    write(block, lane, 0, pack_state(state))
+    block[row * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, 0, count)
 
 
-def _step_blocks(first: int, end: int, blocks: Any, steps: int, h: float, casters: tuple[int, ...]) -> None:
+def _step_one(blocks: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
+    near, around = borrowed_hull(hull), borrowed_obstacles(obstacles)
+    for _ in range(steps):
+        _step_lanes(blocks[0], 1, h, near, around, casters)
+
+
+def _step_block(block: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
+    near, around = borrowed_hull(hull), borrowed_obstacles(obstacles)
+    for _ in range(steps):
+        _step_lanes(block, LANES, h, near, around, casters)
+
+
+def _step_blocks(
+    first: int, end: int, blocks: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]
+) -> None:
     for i in range(first, end):
-        _compiled_step_block(blocks[i], steps, h, casters)
+        _compiled_step_block(blocks[i], steps, h, hull, obstacles, casters)
 
 
+_compiled_careful_step = compiled(_careful_step)
 _compiled_step_block = compiled(_step_block)
 _compiled_step_one = compiled(_step_one)
 _compiled_step_blocks = compiled(_step_blocks)
@@ -61,10 +138,17 @@ class Fleet:
     """Robots with the same number of casters, each with its own parameters and state, moved together.
 
     robots: one Robot for all, or one for each. state (count, 7 + 2 N): x, y [m], cos β, sin β in the world,
-    twist vx, vy, ω in B [m/s, rad/s], then cos δ, sin δ of each caster.
+    twist vx, vy, ω in B [m/s, rad/s], then cos δ, sin δ of each caster. around: obstacles, from
+    `caster_gym.arena.packing.surroundings`.
     """
 
-    def __init__(self, robots: Robot | Sequence[Robot], count: int | None = None, dynamics: Dynamics = "exact") -> None:
+    def __init__(
+        self,
+        robots: Robot | Sequence[Robot],
+        count: int | None = None,
+        dynamics: Dynamics = "exact",
+        around: Surroundings | None = None,
+    ) -> None:
         listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
         if not listed or (count is not None and len(listed) != count):
             raise ValueError(f"a fleet needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
@@ -74,14 +158,15 @@ class Fleet:
         self.robots = tuple(listed)
         self.count = len(listed)
         self._casters = tuple(range(sizes.pop()))
-        n = len(self._casters)
-        self._torque_row = BODY_ROWS + 2 * n
+        self._torque_row, self._room_row = torque_row(self._casters), room_row(self._casters)
+        self._hull = NO_HULL if around is None else around.hull
+        self._obstacles = None if around is None or len(around.obstacles.radii) == 0 else around.obstacles
         self._distinct = list({id(robot): robot for robot in listed}.values())
         packed = {id(robot): pack_parameters(robot_parameters(robot, dynamics)) for robot in self._distinct}
         parameters = np.array([packed[id(robot)] for robot in listed])
-        rows = self._torque_row + 2 * n + parameters.shape[1]
+        rows = self._room_row + 1 + parameters.shape[1]
         self._blocks: NDArray[np.float64] = np.zeros((block_count(self.count), rows * LANES))
-        to_lanes(parameters, self._blocks, self._torque_row + 2 * n)
+        to_lanes(parameters, self._blocks, self._room_row + 1)
         at_rest = np.zeros((self.count, self._torque_row))
         at_rest[:, 2] = 1.0
         at_rest[:, BODY_ROWS::2] = 1.0
@@ -102,6 +187,7 @@ class Fleet:
                 f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}"
             )
         to_lanes(state, self._blocks, 0)
+        to_lanes(np.zeros((self.count, 1)), self._blocks, self._room_row)
 
     def step(self, torque: ArrayLike, dt: float, steps: int = 1) -> None:
         """RK4 steps of dt seconds under joint torques (count, 2 N) [N m]: roll_1, steer_1, roll_2, …"""
@@ -111,10 +197,11 @@ class Fleet:
         for robot in self._distinct:
             robot.check_time_step(dt)
         to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)
+        arguments = (self._blocks, steps, dt, self._hull, self._obstacles, self._casters)
         if self.count == 1:
-            _compiled_step_one(self._blocks, steps, dt, self._casters)
+            _compiled_step_one(*arguments)
         else:
-            over_blocks(_compiled_step_blocks, len(self._blocks), self._blocks, steps, dt, self._casters)
+            over_blocks(_compiled_step_blocks, len(self._blocks), *arguments)
 
     def _checked(self, name: str, value: ArrayLike, width: int) -> NDArray[np.float64]:
         array = np.asarray(value, dtype=np.float64)

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
+from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
+from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.robot import Robot, check_joints
 
 Array = NDArray[np.float64]
@@ -139,10 +141,13 @@ class Model:
         j_n, j_t, after = impulse.collide(v, directions, p, n, e, mu, self._parameters)
         return self._stack((j_n, j_t)), self._stack(after)
 
-    def simulate(self, state: ArrayLike, torque: ArrayLike, dt: float, steps: int) -> Array:
+    def simulate(
+        self, state: ArrayLike, torque: ArrayLike, dt: float, steps: int, around: Surroundings | None = None
+    ) -> Array:
         """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
 
         torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
+        around: obstacles, from `caster_gym.arena.packing.surroundings`, off which the robot bounces.
         Angles are continuous in time. Raises ValueError if dt [s] cannot follow the casters.
         """
         self.robot.check_time_step(dt)
@@ -160,10 +165,19 @@ class Model:
         states = [self._stack((x, y, beta, *twist, *steering))]
         for step in range(steps):
             given = self._torques(torques[step] if changing else torques)
-            now = rk4_step(now, given, (0.0, 0.0, 0.0), dt, self._parameters)
+            now = self._step(now, given, dt, around)
             angles = [self._follow(a, f) for a, f in zip(angles, (now.heading, *now.directions), strict=True)]
             states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:])))
         return self._stack(states, 0)
+
+    def _step(self, now: State, torques: tuple[tuple[Any, Any], ...], dt: float, around: Surroundings | None) -> State:
+        """The state after one step of dt seconds."""
+        if around is None or len(around.obstacles.radii) == 0:
+            return rk4_step(now, torques, (0.0, 0.0, 0.0), dt, self._parameters)
+        hull, obstacles = Hull(*map(_listed_table, around.hull)), Obstacles(*map(_listed_table, around.obstacles))
+        count = len(obstacles.radii)
+        state, _ = guarded_step(now, torques, (0.0, 0.0, 0.0), dt, self._parameters, hull, obstacles, 0, count)
+        return state
 
     def _array(self, name: str, value: Any, last: int) -> Any:
         """The value as an array of finite numbers whose last axis has the right length."""
@@ -217,3 +231,8 @@ class Model:
 
 def _listed(joints: str | Sequence[str]) -> tuple[str, ...]:
     return (joints,) if isinstance(joints, str) else tuple(joints)
+
+
+def _listed_table(part: Any) -> Any:
+    """A table as lists of plain numbers, which every kind of scalar can be multiplied by."""
+    return part.tolist() if isinstance(part, np.ndarray) else part

@@ -9,7 +9,7 @@ from caster_gym.mechanics.parameters import Dynamics, RobotParameters
 from caster_gym.mechanics.scalars import register
 from caster_gym.robot import Robot
 
-register(torch.Tensor, torch.where, torch.sqrt)
+register(torch.Tensor, torch.where, torch.sqrt, torch.any)
 
 
 class TorchModel(Model):

@@ -1,12 +1,14 @@
 """The driven robot: motor commands in, motion out."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from caster_gym.mechanics.caster import joint_rates
+from caster_gym.mechanics.contact import Touch, guarded_step
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.motors import joint_torques, motor_speeds, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, each, total
+from caster_gym.mechanics.separation import Hull, Obstacles
 
 
 class Drive(NamedTuple):
@@ -29,6 +31,17 @@ def all_motor_speeds(state: State, robot: RobotParameters) -> tuple[tuple[Scalar
     return each(motor_speeds, (), rates, robot.casters)
 
 
+def drive_between(
+    before: tuple[tuple[Scalar, Scalar], ...],
+    torques: tuple[tuple[Scalar, Scalar], ...],
+    end: State,
+    robot: RobotParameters,
+) -> Drive:
+    """The record of a time step from the motor speeds at its start, the motor torques and the state at its end."""
+    (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot)))
+    return Drive(torques, power)
+
+
 def driven_step(
     state: State, commands: tuple[tuple[Scalar, Scalar], ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[State, Drive]:
@@ -36,5 +49,23 @@ def driven_step(
     before = all_motor_speeds(state, robot)
     torques = each(motor_torques, (), commands, before, robot.casters)
     end = rk4_step(state, each(joint_torques, (), torques, robot.casters), wrench, h, robot)
-    (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot)))
-    return end, Drive(torques, power)
+    return end, drive_between(before, torques, end, robot)
+
+
+def guarded_driven_step(
+    state: State,
+    commands: tuple[tuple[Scalar, Scalar], ...],
+    wrench: Vector,
+    h: Scalar,
+    robot: RobotParameters,
+    hull: Hull,
+    obstacles: Obstacles,
+    first: Any,
+    last: Any,
+) -> tuple[State, Drive, Touch]:
+    """The same among the obstacles first … last − 1."""
+    before = all_motor_speeds(state, robot)
+    torques = each(motor_torques, (), commands, before, robot.casters)
+    at_joints = each(joint_torques, (), torques, robot.casters)
+    end, touch = guarded_step(state, at_joints, wrench, h, robot, hull, obstacles, first, last)
+    return end, drive_between(before, torques, end, robot), touch

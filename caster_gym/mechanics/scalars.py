@@ -18,12 +18,19 @@ Direction: TypeAlias = tuple[Scalar, Scalar]
 
 _WHERE: dict[type, Callable[[Any, Any, Any], Any]] = {np.ndarray: np.where}
 _SQRT: dict[type, Callable[[Any], Any]] = {np.ndarray: np.sqrt}
+_ANYWHERE: dict[type, Callable[[Any], Any]] = {np.ndarray: np.any}
 
 
-def register(kind: type, where: Callable[[Any, Any, Any], Any], sqrt: Callable[[Any], Any]) -> None:
-    """Teach `where` and `sqrt` another kind of scalar, by the type of its values."""
+def register(
+    kind: type,
+    where: Callable[[Any, Any, Any], Any],
+    sqrt: Callable[[Any], Any],
+    anywhere: Callable[[Any], Any],
+) -> None:
+    """Teach `where`, `sqrt` and `anywhere` another kind of scalar, by the type of its values."""
     _WHERE[kind] = where
     _SQRT[kind] = sqrt
+    _ANYWHERE[kind] = anywhere
 
 
 def where(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
@@ -38,6 +45,17 @@ def sqrt(x: Scalar) -> Scalar:
     """Square root of x >= 0."""
     root = _SQRT.get(type(x))
     return math.sqrt(x) if root is None else root(x)
+
+
+def anywhere(condition: Scalar) -> bool:
+    """Whether a condition holds for any robot of a batch; work that nobody needs can be left out."""
+    test = _ANYWHERE.get(type(condition))
+    return bool(condition if test is None else test(condition))
+
+
+def entry(table: Any, i: Any, j: Any) -> Any:
+    """Number j of row i of a table, which may be an array or a list of lists."""
+    return table[i][j]
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:

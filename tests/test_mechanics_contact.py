@@ -1,0 +1,495 @@
+"""Time steps among obstacles: impacts, lasting contacts, and what keeps the robot from going through a wall."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from caster_gym import Model, load_robot
+from caster_gym.arena import read_arena
+from caster_gym.arena.packing import surroundings
+from caster_gym.mechanics.contact import (
+    _FOUND,
+    STILL,
+    first_contact,
+    free_time,
+    guarded_step,
+    press,
+    sweep_between,
+    value,
+)
+from caster_gym.mechanics.integration import State, rk4_step
+from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
+from caster_gym.robot import Footprint
+from tests.random_robots import CASTER_COUNTS, frictionless, random_robot
+
+ALLOWED = 1e-4  # m, deepest that a robot may be found in an obstacle
+TRIANGLE = ((0.3, 0.0), (-0.2, 0.25), (-0.15, -0.2))
+NEEDLE = ((0.3, 0.0), (-0.3, 0.004), (-0.3, -0.004))
+BOX = ((0.15, -0.08), (0.15, 0.08), (-0.15, 0.08), (-0.15, -0.08))
+FLOOR = {"half_planes": [{"point": [0.0, 0.0], "normal": [0.0, 1.0]}]}
+
+
+def shaped(robot, outline):
+    """The robot with another outline: a radius [m] or corners."""
+    shape = {"disc": outline} if isinstance(outline, float) else {"polygon": outline}
+    platform = robot.platform.model_copy(update={"footprint": Footprint(**shape)})
+    return robot.model_copy(update={"platform": platform})
+
+
+def around_it(robot, arena, **bounce):
+    return surroundings(robot, read_arena({"restitution": 0.0, "friction": 0.0, **arena, **bounce}))
+
+
+def listed(part):
+    return part.tolist() if isinstance(part, np.ndarray) else part
+
+
+class Walk:
+    """A robot, or a batch of it, stepped among obstacles; sums up what it meets."""
+
+    def __init__(self, robot, around, state, torque=None):
+        self.parameters = robot_parameters(robot)
+        self.hull, self.obstacles = Hull(*map(listed, around.hull)), Obstacles(*map(listed, around.obstacles))
+        self.count = len(around.obstacles.radii)
+        self.state = state
+        torque = np.zeros(2 * robot.caster_count) if torque is None else torque
+        self.torques = tuple((float(torque[2 * i]), float(torque[2 * i + 1])) for i in range(robot.caster_count))
+        self.impulse, self.impacts, self.pressing = np.zeros(2), 0.0, 0.0
+
+    def step(self, h, steps=1):
+        for _ in range(steps):
+            self.state, touch = guarded_step(
+                self.state, self.torques, (0.0, 0.0, 0.0), h, self.parameters, self.hull, self.obstacles, 0, self.count
+            )
+            self.impulse = self.impulse + np.stack(touch.impulse, -1)
+            self.impacts = self.impacts + touch.impacts
+            self.pressing = self.pressing + touch.pressing
+        return self
+
+    @property
+    def gap(self):
+        return clearance(self.state.position, self.state.heading, self.hull, self.obstacles, 0, self.count)
+
+
+def state_of(x, y, beta, velocity, omega, steering):
+    """A state from the velocity (2,) of C in W; numbers or arrays."""
+    c, s = np.cos(beta), np.sin(beta)
+    vx, vy = velocity
+    directions = tuple((np.cos(angle), np.sin(angle)) for angle in steering)
+    return State((x, y), (c, s), (c * vx + s * vy, c * vy - s * vx, omega), directions)
+
+
+def floats(state):
+    """The same state in Python's numbers, which are the fastest for one robot."""
+    return State(
+        tuple(map(float, state.position)),
+        tuple(map(float, state.heading)),
+        tuple(map(float, state.twist)),
+        tuple((float(c), float(s)) for c, s in state.directions),
+    )
+
+
+def steering_of(state):
+    return np.stack([np.arctan2(s, c) for c, s in state.directions], -1)
+
+
+def energy(model, state):
+    return model.kinetic_energy(steering_of(state), np.stack(state.twist, -1))
+
+
+def corners_of(outline, state):
+    """Corners (M, 2) of a robot in W; a disc is a polygon of 90 corners."""
+    if isinstance(outline, float):
+        angles = np.arange(90) * 2.0 * np.pi / 90
+        outline = outline * np.stack([np.cos(angles), np.sin(angles)], -1)
+    c, s = state.heading
+    return np.asarray(outline) @ np.array([[c, s], [-s, c]]) + np.asarray(state.position)
+
+
+# Impacts
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 10**6),
+    casters=st.sampled_from(CASTER_COUNTS),
+    outline=st.sampled_from([0.2, TRIANGLE, NEEDLE]),
+    e=st.floats(0.0, 1.0),
+    mu=st.sampled_from([0.0, 0.1, 0.5, 2.0]),
+)
+def test_an_impact_loses_the_energy_that_it_must(seed, casters, outline, e, mu):
+    """(C2): exactly that without friction, at least that with it; the contact leaves at e times its approach."""
+    rng = np.random.default_rng(seed)
+    robot = shaped(random_robot(seed, casters), outline)
+    model, around = Model(robot), around_it(robot, FLOOR, restitution=e, friction=mu)
+    beta, angles = rng.uniform(-np.pi, np.pi), rng.uniform(-np.pi, np.pi, casters)
+    lowest = min(corners_of(outline, state_of(0.0, 0.0, beta, (0.0, 0.0), 0.0, ()))[:, 1])
+    height = outline if isinstance(outline, float) else -lowest
+    velocity, omega = rng.uniform(-10.0, 10.0, 2), rng.uniform(-20.0, 20.0)
+    walk = Walk(robot, around, floats(state_of(0.0, height, beta, velocity, omega, angles)))
+    state, obstacles = walk.state, walk.obstacles
+    apart = separation(state.position, state.heading, walk.hull, obstacles, 0)
+    c, s = state.heading
+    n = np.array([s, c])
+    corners = np.zeros((1, 2)) if isinstance(outline, float) else np.asarray(outline)
+    touching = corners @ n <= (corners @ n).min() + 1e-4
+    if touching.sum() > 1 or abs(apart.gap) > 1e-9:
+        return  # two contacts at once are another test
+    point = corners[touching][0] - (outline * n if isinstance(outline, float) else 0.0)
+    arm = np.array([n[0], n[1], point[0] * n[1] - point[1] * n[0]])
+    mobility = arm @ np.linalg.solve(model.inertia(angles), arm)
+    v_n = arm @ state.twist
+    after, pressure = press(state.twist, state, state.heading, e, 1e9, walk.parameters, walk.hull, obstacles, 0, 1)
+    before_J, after_J = energy(model, state), model.kinetic_energy(angles, after)
+    rounding = 1e-12 * max(before_J, 1.0)
+    if v_n >= 0.0:
+        assert_array_equal(after, state.twist)
+        assert pressure.normal == 0.0
+        return
+    e = e if v_n < -0.01 else 0.0
+    assert_allclose(arm @ after, -e * v_n, rtol=0.0, atol=1e-10)  # rounding of arms of 0.3 m and twists of 20
+    lost = 0.5 * (1.0 - e * e) * v_n**2 / mobility
+    if mu == 0.0:
+        assert_allclose(before_J - after_J, lost, rtol=0.0, atol=rounding)
+    assert before_J - after_J >= lost - rounding
+
+
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("h", [1e-3, 2.7e-3, 1e-2])
+def test_a_disc_thrown_straight_at_a_wall_bounces_where_and_when_it_must(e, h):
+    """By hand: it goes 0.05 m at 2 m/s, then back at e times that; no force acts along aligned wheels."""
+    robot = shaped(load_robot("chung2008"), 0.1)
+    around = around_it(robot, {"half_planes": [{"point": [1.0, 0.0], "normal": [-1.0, 0.0]}]}, restitution=e)
+    walk = Walk(robot, around, floats(state_of(0.85, 0.0, 0.0, (2.0, 0.0), 0.0, np.zeros(3))))
+    total = 40e-3
+    steps = round(total / h)
+    walk.step(h, steps)
+    expected = 0.9 - e * 2.0 * (steps * h - 0.025)
+    assert_allclose(walk.state.position, (expected, 0.0), rtol=0.0, atol=2.0 * _FOUND)  # the search stops that early
+    assert_allclose(walk.state.twist, (-2.0 * e, 0.0, 0.0), rtol=0.0, atol=1e-12)  # rounding
+    mass = Model(robot).inertia(np.zeros(3))[0, 0]
+    assert_allclose(walk.impulse, (-(1.0 + e) * mass * 2.0, 0.0), rtol=0.0, atol=1e-9)  # rests without a force
+    assert_allclose(walk.pressing, (1.0 + e) * mass * 2.0, rtol=0.0, atol=1e-9)
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=st.integers(0, 10**6), outline=st.sampled_from([0.2, TRIANGLE]), mu=st.sampled_from([0.0, 0.3]))
+def test_a_step_with_an_impact_is_free_motion_the_impulse_and_free_motion(seed, outline, mu):
+    """Against steps ten times finer up to the contact, Model.collide there, and such steps again."""
+    rng = np.random.default_rng(seed)
+    robot, h, e = shaped(random_robot(seed, 3), outline), 2e-3, 0.6
+    torque = rng.uniform(-0.2, 0.2, 6)
+    velocity = (rng.uniform(-1.0, 1.0), -1.0)
+    start = floats(state_of(0.0, 0.0, rng.uniform(-3, 3), velocity, rng.uniform(-1, 1), rng.uniform(-3, 3, 3)))
+    torques, parameters = tuple(zip(torque[::2].tolist(), torque[1::2].tolist(), strict=True)), robot_parameters(robot)
+
+    def later(state, t):
+        for _ in range(10):
+            state = rk4_step(state, torques, (0.0, 0.0, 0.0), t / 10, parameters)
+        return state
+
+    def heights(state):
+        if isinstance(outline, float):
+            return np.array([state.position[1] - outline])
+        return corners_of(outline, state)[:, 1]
+
+    floor = heights(later(start, 0.4 * h)).min()
+    touches = brentq(lambda t: heights(later(start, t)).min() - floor, 0.0, h, xtol=1e-12)
+    there = later(start, touches)
+    if (heights(there) < floor + 5e-3).sum() > 1:
+        return  # both ends of a face may touch within this step
+    c, s = there.heading
+    low = (
+        np.array([0.0, -outline]) if isinstance(outline, float) else corners_of(outline, there)[heights(there).argmin()]
+    )
+    arm = low if isinstance(outline, float) else low - there.position
+    point = (c * arm[0] + s * arm[1], c * arm[1] - s * arm[0])
+    hit, twist = Model(robot).collide(steering_of(there), there.twist, point, (s, c), e, mu)
+    expected = later(there._replace(twist=tuple(map(float, twist))), h - touches)
+    floor_there = {"half_planes": [{"point": [0.0, floor], "normal": [0.0, 1.0]}]}
+    walk = Walk(robot, around_it(robot, floor_there, restitution=e, friction=mu), start, torque).step(h)
+    assert walk.impacts == 1.0
+    # the search stops 1 µm before the contact, so that the impact is 1 µs early: twists change by 1e-3 in that time at
+    # most; RK4 at 2 ms adds less
+    assert_allclose(walk.impulse, (-hit[1], hit[0]), rtol=0.0, atol=1e-3 * hit[0])
+    assert_allclose(walk.state.position, expected.position, rtol=0.0, atol=3.0 * _FOUND)
+    assert_allclose(walk.state.twist, expected.twist, rtol=0.0, atol=2e-3)
+
+
+# The search for the first contact
+
+
+def random_step(seed, h, outline=BOX):
+    """Two ends of a fast time step, with casters in any direction."""
+    rng = np.random.default_rng(seed)
+    robot = shaped(random_robot(seed, 3), outline)
+    start = floats(
+        state_of(
+            *rng.uniform(-0.4, 0.4, 2),
+            rng.uniform(-3, 3),
+            rng.uniform(-10, 10, 2),
+            rng.uniform(-30, 30),
+            rng.uniform(-3, 3, 3),
+        )
+    )
+    torques = tuple((float(a), float(b)) for a, b in rng.uniform(-0.5, 0.5, (3, 2)))
+    return robot, start, rk4_step(start, torques, (0.0, 0.0, 0.0), h, robot_parameters(robot))
+
+
+@settings(deadline=None, max_examples=50)
+@given(seed=st.integers(0, 10**6))
+def test_the_sweep_goes_through_both_ends_and_no_point_accelerates_more_than_it_says(seed):
+    """(O5): values and rates of both ends; accelerations by finite differences stay below the bound and reach it."""
+    h = 2e-3
+    _, start, end = random_step(seed, h)
+    sweep = sweep_between(start, end, h, 0.17)
+    polynomials = (sweep.x, sweep.y, sweep.c, sweep.s)
+    for t, there in ((0.0, start), (h, end)):
+        c, s = there.heading
+        u, v, omega = there.twist
+        rates = (c * u - s * v, s * u + c * v, -s * omega, c * omega)
+        assert_allclose([value(p, t) for p in polynomials], [*there.position, c, s], rtol=0.0, atol=1e-14)
+        for p, rate in zip(polynomials, rates, strict=True):
+            small = 1e-6
+            slope = (value(p, t + small) - value(p, t - small)) / (2.0 * small)
+            assert_allclose(slope, rate, rtol=0.0, atol=1e-6)  # cubic: small² times jerks of 1e6 m/s³
+    times = np.linspace(0.0, h, 41)
+    bends = [[2.0 * p[2] + 6.0 * p[3] * t for p in polynomials] for t in times]
+    accelerations = [np.hypot(b[0], b[1]) + 0.17 * np.hypot(b[2], b[3]) for b in bends]
+    assert max(accelerations) <= sweep.acceleration * (1.0 + 1e-12)
+    assert sweep.acceleration <= 2.0 * max(accelerations)  # both greatest values need not be at the same end
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 10**6), outline=st.sampled_from([0.02, BOX, NEEDLE]))
+def test_no_contact_happens_in_the_time_that_is_free(seed, outline):
+    """(O6): at 200 moments of it the robot of the sweep is still apart."""
+    h = 2e-3
+    robot, start, end = random_step(seed, h, outline)
+    rng = np.random.default_rng((seed, 1))
+    a = rng.uniform(-0.6, 0.6, 2)
+    angle = rng.uniform(0.0, 6.3)
+    b = a + rng.uniform(0.02, 0.5) * np.array([np.cos(angle), np.sin(angle)])
+    around = around_it(robot, {"walls": [{"start": a.tolist(), "end": b.tolist(), "thickness": 0.005}]})
+    hull, obstacles = around
+    sweep = sweep_between(start, end, h, hull.reach)
+    apart = separation(start.position, start.heading, hull, obstacles, 0)
+    if apart.gap <= 0.0:
+        return
+    surely = free_time(sweep, 0.0, apart, 0.0, hull)
+    contact = first_contact(sweep, h, hull, obstacles, 0, 1)
+    assert contact >= min(surely, h)
+    for until, share in ((min(surely, h), 1.0), (contact, 1.0)):
+        t = np.linspace(0.0, share * until, 200)
+        pose = (value(sweep.x, t), value(sweep.y, t)), (value(sweep.c, t), value(sweep.s, t))
+        # the last moment touches, up to rounding
+        assert separation(*pose, hull, obstacles, 0).gap.min() > -1e-12
+    if contact < h:
+        pose = tuple(value(p, contact) for p in (sweep.x, sweep.y, sweep.c, sweep.s))
+        assert separation(pose[:2], pose[2:], hull, obstacles, 0).gap < 2.0 * _FOUND
+
+
+# Contacts that last
+
+
+def tied_to_the_floor(model, row, torque, radius, mu, duration):
+    """x, y, β, twist and steering (…) of a disc whose lowest point stays on y = 0, by Lagrange's multiplier."""
+    n_casters = len(row) - 6
+
+    def rate(_, q):
+        c, s = np.cos(q[2]), np.sin(q[2])
+        v, steering = q[3:6], q[6:]
+        n = np.array([s, c, 0.0])
+        t = np.array([-c, s, -radius])  # the normal turned by +90°: −x of the world
+        along = t @ v
+        push = n - mu * np.sign(along) * t
+        m, turning = model.inertia(steering), np.array([v[2] * c, -v[2] * s, 0.0])  # ṅ: the axis turns in B at −ω
+        free = model.forward_dynamics(steering, v, torque)
+        multiplier = -(n @ free + turning @ v) / (n @ np.linalg.solve(m, push))
+        assert multiplier > 0.0  # pressed, never pulled
+        acceleration = free + np.linalg.solve(m, push) * multiplier
+        _, _, delta = model.rates(steering, v)
+        return np.concatenate(([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]], acceleration, delta))
+
+    assert len(row) == 6 + n_casters
+    return solve_ivp(rate, (0.0, duration), row, rtol=1e-10, atol=1e-12).y[:, -1]
+
+
+def pressed(angle, beta=0.4):
+    """A robot on the floor y = 0 whose wheels push it downwards at an angle from the x-axis, and its torques."""
+    robot = shaped(load_robot("chung2008"), 0.1)
+    steering = np.full(3, angle - beta) + np.array([0.02, -0.01, 0.0])
+    torque = np.tile([0.05, 0.0], 3)
+    return robot, np.array([0.0, 0.1, beta, 0.0, 0.0, 0.0, *steering]), torque
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.2])
+def test_a_robot_slides_along_a_wall_as_one_that_is_tied_to_it(mu):
+    """(O7): the error falls in proportion to the time step. Pushed at 45°, with friction slower but not stuck."""
+    robot, row, torque = pressed(-np.pi / 4)
+    model, duration = Model(robot), 0.4
+    # friction needs a direction from the start
+    row[3:5] = 0.05 * np.array([np.cos(row[2]), -np.sin(row[2])])
+    expected = tied_to_the_floor(model, row, torque, 0.1, mu, duration)
+    errors = []
+    for h in (4e-3, 2e-3, 1e-3):
+        start = floats(state_of(0.0, 0.1, row[2], (0.05, 0.0), 0.0, row[6:]))
+        walk = Walk(robot, around_it(robot, FLOOR, friction=mu), start, torque).step(h, round(duration / h))
+        assert walk.impacts == 0.0
+        errors.append(np.hypot(*(np.array(walk.state.position) - expected[:2])))
+    assert expected[0] > 0.05
+    assert errors[0] < 0.02 * expected[0]
+    assert errors[2] < 0.7 * errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.parametrize(("angle", "sticks"), [(-1.2, True), (-0.9, False)])
+def test_friction_holds_inside_its_cone_and_not_outside(angle, sticks):
+    """A box on its long side; its motors push at 21° and 38° from the normal, friction of 0.5 holds up to 27°."""
+    robot, torque = shaped(load_robot("chung2008"), BOX), np.tile([0.05, 0.0], 3)
+    start = floats(state_of(0.0, 0.08, 0.0, (0.0, 0.0), 0.0, np.full(3, angle)))
+    walk = Walk(robot, around_it(robot, FLOOR, friction=0.5), start, torque).step(4e-3, 50)
+    force = 3 * 0.05 / 0.025  # N, for 0.2 s
+    if sticks:
+        assert abs(walk.state.position[0]) < 10.0 * STILL * 0.2
+        assert_allclose(walk.impulse, (-0.2 * force * np.cos(angle), -0.2 * force * np.sin(angle)), rtol=1e-4)
+    else:
+        assert walk.state.position[0] > 1e-3
+        assert_allclose(walk.impulse[0], -0.5 * walk.impulse[1], rtol=1e-3)
+
+
+@pytest.mark.parametrize(("mu", "rolls"), [(0.5, True), (0.02, False)])
+def test_a_disc_rolls_along_a_wall_that_is_rough_enough(mu, rolls):
+    robot, row, torque = pressed(-1.2)
+    start = floats(state_of(0.0, 0.1, row[2], (0.0, 0.0), 0.0, row[6:]))
+    walk = Walk(robot, around_it(robot, FLOOR, friction=mu), start, torque).step(4e-3, 50)
+    c, s = walk.state.heading
+    slip = c * walk.state.twist[0] - s * walk.state.twist[1] + 0.1 * walk.state.twist[2]
+    if rolls:
+        assert abs(slip) < 1e-3
+        assert 0.0 < -walk.impulse[0] < 0.5 * walk.impulse[1]
+        assert walk.state.twist[2] < -0.05
+    else:
+        assert slip > 1e-2
+        assert_allclose(walk.impulse[0], -0.02 * walk.impulse[1], rtol=1e-3)
+
+
+@pytest.mark.parametrize("h", [2e-3, 1e-2])
+@pytest.mark.parametrize("e", [0.0, 0.4])
+def test_a_robot_that_leans_against_a_wall_comes_to_rest(h, e):
+    robot, _, torque = pressed(-np.pi / 2)
+    steering = np.full(3, -np.pi / 2)
+    start = floats(state_of(0.0, 0.15, 0.0, (0.0, -0.3), 0.0, steering))
+    walk = Walk(robot, around_it(robot, FLOOR, restitution=e, friction=0.3), start, torque).step(h, round(2.0 / h))
+    impacts = walk.impacts
+    for _ in range(100):
+        walk.step(h)
+        assert abs(walk.gap) < 2e-5
+        assert abs(walk.state.twist[1]) < 10.0 * STILL
+    assert walk.impacts == impacts
+
+
+@pytest.mark.parametrize("outline", [0.1, TRIANGLE, BOX], ids=["disc", "triangle", "box"])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_an_acute_corner_neither_lets_the_robot_in_nor_holds_its_time(outline, e):
+    """Two half-planes at 30°: pushed into the corner and out of it again."""
+    half = np.radians(15.0)
+    sides = [
+        {"point": [0.0, 0.0], "normal": [-np.sin(half), np.cos(half)]},
+        {"point": [0.0, 0.0], "normal": [-np.sin(half), -np.cos(half)]},
+    ]
+    robot = shaped(load_robot("chung2008"), outline)
+    around = around_it(robot, {"half_planes": sides}, restitution=e, friction=0.1)
+    start = floats(state_of(-1.6, 0.02, 0.1, (1.5, 0.1), 0.5, np.zeros(3)))
+    walk = Walk(robot, around, start, np.tile([0.1, 0.0], 3))
+    assert walk.gap > 0.0
+    for _ in range(200):
+        assert walk.step(5e-3).gap >= -ALLOWED
+    walk.torques = ((-0.1, 0.0),) * 3
+    farthest = 0.0
+    for _ in range(200):
+        assert walk.step(5e-3).gap >= -ALLOWED
+        farthest = max(farthest, walk.gap)
+    assert walk.impacts > 0
+    assert farthest > 5e-3
+
+
+def test_a_flush_edge_does_not_turn():
+    """A box on its long side, pushed off its middle: the two ends of the edge carry what one could not."""
+    robot = shaped(load_robot("chung2008"), BOX)
+    torque = np.array([0.1, 0.0, 0.02, 0.0, 0.02, 0.0])
+    start = floats(state_of(0.0, 0.08, 0.0, (0.0, 0.0), 0.0, np.full(3, -np.pi / 2)))
+    walk = Walk(robot, around_it(robot, FLOOR, friction=0.1), start, torque)
+    for _ in range(400):
+        walk.step(5e-3)
+        assert abs(walk.state.heading[1]) < ALLOWED / 0.15
+        assert abs(walk.gap) < ALLOWED
+    assert_allclose(walk.pressing, 0.14 / 0.025 * 2.0, rtol=1e-3)  # N s: all of the motors' force, for 2 s
+
+
+@pytest.mark.parametrize("outline", [0.1, BOX], ids=["disc", "box"])
+@pytest.mark.parametrize("room", [1e-2, 1e-3, 1e-4, 0.0])
+def test_a_robot_between_two_walls_that_it_barely_fits_stays_between_them(outline, room):
+    """More impacts than a time step may have: it ends all the same, and nothing gets through."""
+    robot = shaped(load_robot("chung2008"), outline)
+    height = 0.1 if isinstance(outline, float) else 0.08
+    walls = [
+        {"start": [-1.0, side * (height + 0.5 * room)], "end": [1.0, side * (height + 0.5 * room)]} for side in (-1, 1)
+    ]
+    walk = Walk(
+        robot,
+        around_it(robot, {"walls": walls}, restitution=1.0),
+        floats(state_of(0.0, 0.0, 0.0, (0.1, 2.0), 0.0, np.full(3, 1.5))),
+        np.tile([0.05, 0.0], 3),
+    )
+    before = energy(Model(robot), walk.state)
+    for _ in range(60):
+        walk.step(1e-2)
+        assert walk.gap >= -ALLOWED
+        assert abs(walk.state.position[1]) < 0.5 * room + ALLOWED
+    assert walk.impacts > 0
+    assert np.isfinite(walk.state.twist).all()
+    assert energy(Model(robot), walk.state) < before + 0.15 / 0.025 * 1.0
+
+
+def test_far_obstacles_change_nothing():
+    """To the last bit."""
+    robot = shaped(random_robot(3, 4), TRIANGLE)
+    rng = np.random.default_rng(1)
+    start = floats(state_of(0.0, 0.0, 0.3, (1.0, -0.5), 2.0, rng.uniform(-3, 3, 4)))
+    torque = rng.uniform(-0.5, 0.5, 8)
+    walk = Walk(robot, around_it(robot, {"room": [[-5, -5], [5, 5]]}), start, torque)
+    free = start
+    for _ in range(50):
+        walk.step(2e-3)
+        free = rk4_step(free, walk.torques, (0.0, 0.0, 0.0), 2e-3, walk.parameters)
+    assert_array_equal(np.concatenate([np.ravel(p) for p in walk.state]), np.concatenate([np.ravel(p) for p in free]))
+
+
+@settings(deadline=None, max_examples=6)
+@given(seed=st.integers(0, 10**6), outline=st.sampled_from([0.2, TRIANGLE]), e=st.sampled_from([0.0, 0.5, 1.0]))
+def test_a_coasting_robot_gains_no_energy(seed, outline, e):
+    """Without motors the energy falls, but for the error of the time step, which the free robot shows."""
+    robot = shaped(frictionless(random_robot(seed, 3)), outline)
+    model, rng, count, h = Model(robot), np.random.default_rng(seed), 20, 2e-3
+    arena = {"room": [[-0.42, -0.42], [0.42, 0.42]]}
+    start = state_of(
+        rng.uniform(-0.1, 0.1, count),
+        rng.uniform(-0.1, 0.1, count),
+        rng.uniform(-3.0, 3.0, count),
+        rng.uniform(-1.0, 1.0, (2, count)),
+        rng.uniform(-2.0, 2.0, count),
+        rng.uniform(-3.0, 3.0, (3, count)),
+    )
+    walk = Walk(robot, around_it(robot, arena, restitution=e, friction=0.2), start)
+    for _ in range(120):
+        before, old = energy(model, walk.state), walk.state
+        free = rk4_step(old, walk.torques, (0.0, 0.0, 0.0), h, walk.parameters)
+        error = abs(energy(model, free) - before)
+        walk.step(h)
+        assert (energy(model, walk.state) <= before + 10.0 * error + 1e-9).all()
+    assert (walk.impacts > 0).any()
