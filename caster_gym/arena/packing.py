@@ -1,0 +1,68 @@
+"""Arenas and robots as the tables that the mechanics reads."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.arena.arena import Arena
+from caster_gym.arena.outlines import Outline, convex
+from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
+from caster_gym.robot import Robot
+
+
+def hull_of(robot: Robot) -> Hull:
+    """The outline of a robot's platform, in B."""
+    footprint = robot.platform.footprint
+    if footprint.disc is not None:
+        return hull_from(Outline((), ((0.0, 0.0),), footprint.disc))
+    return hull_from(convex(footprint.polygon or ()))  # a footprint has one of the two
+
+
+def surroundings(robot: Robot, arena: Arena) -> Surroundings:
+    """A robot in an arena, as the engines take it."""
+    return Surroundings(hull_of(robot), pack([arena])[0])
+
+
+def hull_from(outline: Outline) -> Hull:
+    """A hull of any outline about the origin of its frame."""
+    corners = _table(outline.corners, 2)
+    reach = float(np.hypot(corners[:, 0], corners[:, 1]).max()) + outline.radius
+    return Hull(_table(outline.faces, 3), corners, outline.radius, reach)
+
+
+def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
+    """All obstacles of some arenas in one table, and the first and the end (arenas, 2) of those of each.
+
+    The arenas share one restitution and one friction. Obstacles are in the order of `Arena.obstacles`.
+    """
+    if not arenas:
+        raise ValueError("at least one arena is needed, got none")
+    if any(arena.beside is not None for arena in arenas):
+        raise ValueError("obstacles beside a path have no place before they are drawn: call draw_beside first")
+    bounces = {(arena.restitution, arena.friction) for arena in arenas}
+    if len(bounces) > 1:
+        raise ValueError(f"arenas in one table must share restitution and friction, got {sorted(bounces)}")
+    outlines = [[one.outline for _, one in arena.obstacles] for arena in arenas]
+    everything = [outline for those in outlines for outline in those]
+    obstacles = Obstacles(
+        faces=_table([face for outline in everything for face in outline.faces], 3),
+        corners=_table([corner for outline in everything for corner in outline.corners], 2),
+        radii=np.array([outline.radius for outline in everything], dtype=np.float64),
+        spans=np.hstack(
+            [_spans([len(one.faces) for one in everything]), _spans([len(one.corners) for one in everything])]
+        ),
+        restitution=arenas[0].restitution,
+        friction=arenas[0].friction,
+    )
+    return obstacles, _spans([len(those) for those in outlines])
+
+
+def _spans(counts: Sequence[int]) -> NDArray[np.int64]:
+    """First and end (K, 2) of consecutive parts of these lengths."""
+    ends = np.cumsum(np.array(counts, dtype=np.int64))
+    return np.stack([ends - np.array(counts, dtype=np.int64), ends], axis=1)
+
+
+def _table(rows: Sequence[Sequence[float]], columns: int) -> NDArray[np.float64]:
+    return np.array(rows, dtype=np.float64).reshape(-1, columns)

@@ -1,0 +1,139 @@
+"""caster_gym.arena.arena and .outlines: reading arenas, and saying what is wrong with one."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from caster_gym.arena import Arena, read_arena
+from caster_gym.arena.outlines import convex
+from caster_gym.configuration import ConfigurationError
+
+FULL = {
+    "room": [[-2, -1], [2, 1]],
+    "half_planes": [{"point": [0.0, -3.0], "normal": [3.0, 4.0]}],
+    "walls": [{"start": [0, 0], "end": [1, 0]}, {"start": [0, 0], "end": [0, 2], "thickness": 0.1}],
+    "pillars": [{"centre": [0.5, 0.5], "radius": 0.2}],
+    "polygons": [{"corners": [[0, 0], [1, 0], [1, 1], [0, 1]]}],
+    "beside": {"pillars": 1},
+    "restitution": 0.3,
+    "friction": 0.1,
+}
+
+
+def test_nothing_means_an_arena_without_obstacles():
+    assert read_arena(None) == read_arena({}) == Arena()
+    assert Arena().obstacles == ()
+
+
+def test_an_arena_can_be_a_yaml_file(tmp_path):
+    file = tmp_path / "arena.yaml"
+    file.write_text("{pillars: [{centre: [1e0, 2], radius: 2e-1}], restitution: 0.9}", encoding="utf-8")
+    expected = read_arena({"pillars": [{"centre": [1.0, 2.0], "radius": 0.2}], "restitution": 0.9})
+    assert read_arena(str(file)) == read_arena(file) == expected
+
+
+def test_arenas_are_hashable_and_survive_a_dump():
+    arena = read_arena(FULL)
+    assert read_arena(arena) is arena
+    assert read_arena(arena.model_dump(mode="json")) == arena
+    assert len({arena, read_arena(FULL)}) == 1
+
+
+def test_normals_have_unit_length():
+    assert_allclose(read_arena(FULL).half_planes[0].normal, (0.6, 0.8), rtol=1e-15)
+
+
+def test_every_obstacle_has_a_name_that_tells_it_from_the_others():
+    names = [name for name, _ in read_arena(FULL).obstacles]
+    assert len(set(names)) == len(names) == 9
+    assert names[:4] == [f"the room's side {end}" for end in ("x_min", "y_min", "x_max", "y_max")]
+    assert names[6] == "wall 2 from (0, 0) m to (0, 2) m"
+    assert names[7] == "pillar 1 at (0.5, 0.5) m"
+
+
+def test_a_room_is_free_inside_and_nowhere_else():
+    """Each side is a half-plane whose face has the free side in front."""
+    sides = read_arena({"room": [[-2, -1], [2, 1]]}).sides
+    faces = np.array([side.outline.faces[0] for side in sides])
+    points = np.random.default_rng(0).uniform(-3.0, 3.0, (500, 2))
+    in_front = (points @ faces[:, :2].T > faces[:, 2]).all(1)
+    np.testing.assert_array_equal(in_front, (np.abs(points) < [2.0, 1.0]).all(1))
+
+
+def test_a_wall_is_as_thick_as_it_says_and_ends_where_it_says():
+    """A wall along (3, 4): what lies in it, by coordinates along and across."""
+    wall = read_arena({"walls": [{"start": [1, 1], "end": [4, 5], "thickness": 0.5}]}).walls[0]
+    faces = np.array(wall.outline.faces)
+    points = np.random.default_rng(1).uniform(0.0, 6.0, (2000, 2))
+    inside = (points @ faces[:, :2].T < faces[:, 2]).all(1)
+    along, across = (points - 1.0) @ [0.6, 0.8], (points - 1.0) @ [-0.8, 0.6]
+    np.testing.assert_array_equal(inside, (along > 0.0) & (along < 5.0) & (abs(across) < 0.25))
+    assert inside.sum() > 20
+
+
+def test_faces_of_an_outline_pass_through_its_corners_and_have_all_others_behind():
+    angles = np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 7))
+    corners = np.stack([2.0 * np.cos(angles) + 1.0, np.sin(angles)], -1)
+    faces = np.array(convex(tuple(map(tuple, corners))).faces)
+    assert_allclose(np.hypot(*faces[:, :2].T), 1.0, rtol=1e-14)
+    behind = faces[:, 2] - corners @ faces[:, :2].T  # (corner, face)
+    on_face = np.eye(7, dtype=bool) | np.roll(np.eye(7, dtype=bool), 1, axis=0)
+    assert_allclose(behind[on_face], 0.0, atol=1e-14)  # rounding of numbers of order 1
+    assert (behind[~on_face] > 0.0).all()
+
+
+def test_regular_polygons_of_any_size_are_convex():
+    for count in (3, 4, 17, 100):
+        around = np.exp(2j * np.pi * np.arange(count) / count)
+        for size in (1e-3, 1.0, 1e3):
+            corners = [[size * p.real, size * p.imag] for p in around]
+            assert len(read_arena({"polygons": [{"corners": corners}]}).polygons[0].outline.faces) == count
+
+
+STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) / 5]  # turns left at every corner
+
+
+@pytest.mark.parametrize(
+    ("arena", "message"),
+    [
+        (
+            {"polygons": [{"corners": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]}]},
+            r"polygon 1: 'corners' must be convex, but it bends inwards at corner 3 at \(0\.2, 0\.2\) m",
+        ),
+        (
+            {"polygons": [*FULL["polygons"], {"corners": [[0, 0], [2, 2], [2, 0], [0, 2]]}]},
+            r"polygon 2: .* must not cross itself, but its edges from corner 1 and from corner 3 cross at \(1, 1\) m",
+        ),
+        ({"polygons": [{"corners": STAR}]}, "must not cross itself, but its edges from corner 1 and from corner 3"),
+        (
+            {"polygons": [{"corners": [[0, 0], [0, 1], [1, 0]]}]},
+            "must be listed counter-clockwise, these run clockwise",
+        ),
+        (
+            {"polygons": [{"corners": [[0, 0], [0.5, 0], [1, 0], [1, 1]]}]},
+            r"it runs straight on at corner 2 at \(0\.5, 0\) m; leave that one out",
+        ),
+        (
+            {"polygons": [{"corners": [[0, 0], [1, 0], [1, 1], [0, 0]]}]},
+            r"must all differ, but corner 4 at \(0, 0\) m is the same as corner 1",
+        ),
+        ({"polygons": [{"corners": [[0, 0], [1, 0]]}]}, "'corners' should have at least 3 items, got 2"),
+        ({"half_planes": [{"point": [0, 0], "normal": [0, 0]}]}, r"'half_planes': 'normal' must have a direction"),
+        ({"walls": [{"start": [1, 2], "end": [1, 2]}]}, r"wall 1: start and end must differ, got \(1, 2\) m"),
+        ({"walls": [{"start": [1, 2], "end": [1, "b"]}]}, "wall 1: number 2 of 'end' should be a number, got 'b'"),
+        ({"pillars": [{"centre": [0, 0], "radius": 0}]}, "pillar 1: 'radius' should be greater than 0, got 0"),
+        ({"pillars": [{"centre": [0, 0], "radios": 1}]}, "unknown key 'radios'; did you mean 'radius'"),
+        ({"pillars": [{"centre": [2e6, 0]}]}, "should be less than or equal to 1000000, got 2000000"),
+        ({"room": [[0, 0], [0, 1]]}, "'room' must be .* each minimum below its maximum"),
+        ({"beside": {"gap": [0.2, 0.1]}}, r"'beside\.gap' must be the least and the greatest value, in this order"),
+        ({"beside": {"gap": [0.0, 0.1]}}, r"'beside\.gap' should be greater than or equal to 0\.001, got 0"),
+        ({"restitution": 1.2}, "'restitution' should be less than or equal to 1, got 1.2"),
+        ({"pilars": []}, "arena: unknown key 'pilars'; did you mean 'pillars'"),
+        ("nowhere.yaml", r"there is no file 'nowhere\.yaml'"),
+        ("room", "an arena is a mapping or the name of a YAML file, got 'room'"),
+        (3, "an arena is a mapping or the name of a YAML file, got 3"),
+    ],
+)
+def test_what_is_no_arena_is_refused_by_name(arena, message):
+    with pytest.raises(ConfigurationError, match=message):
+        read_arena(arena)
