@@ -79,6 +79,57 @@ def test_paths_differ_in_speed_in_turns_and_in_direction():
     assert 0.1 < backwards.mean() < 0.4  # a quarter draws it; some of those never change sign
 
 
+def test_the_share_of_paths_that_reverse_can_be_chosen():
+    for share, least, most in ((0.0, 0.0, 0.0), (1.0, 0.6, 1.0)):
+        velocity = samples(count=100, reversing=share)[:, 25:-25, 4:6]
+        back = ((velocity[:, 1:] * velocity[:, :-1]).sum(axis=-1) < 0.0).any(axis=1)
+        assert least <= back.mean() <= most
+
+
+def test_paths_that_do_not_reverse_are_the_same_whatever_the_share():
+    table, forwards = samples(count=40), samples(count=40, reversing=0.0)
+    same = (table == forwards).all(axis=(1, 2))
+    assert 0.5 < same.mean() < 1.0  # three quarters expected, σ = 0.07
+
+
+def test_a_least_radius_bounds_the_turns_of_tangent_and_heading():
+    """Turns over way, |ω| / v, at all samples but those at rest; without a bound there are tighter ones."""
+    sharpest = []
+    for radius in (0.3, None):
+        table = samples(count=100, reversing=0.0, min_radius=radius)[:, 1:-1]
+        speed, velocity = speeds(table), table[..., 4] + 1j * table[..., 5]
+        turn = (velocity.conj() * (table[..., 7] + 1j * table[..., 8])).imag / speed**2  # [rad/s] of the tangent
+        sharpest.append([(abs(turn) / speed).max(axis=1), (abs(table[..., 6]) / speed).max(axis=1)])
+    (bound_tangent, bound_heading), (tangent, heading) = sharpest
+    assert max(bound_tangent.max(), bound_heading.max()) <= (1.0 + 1e-6) / 0.3  # quotients of small numbers at the ends
+    assert (tangent > 1.0 / 0.3).any() and (heading > 1.0 / 0.3).any()
+    assert_allclose(bound_heading.max(), 1.0 / 0.3, rtol=1e-6)  # one that was too sharp turns just as it may
+
+
+def test_bounded_paths_keep_to_their_limits():
+    table = samples(count=100, reversing=0.0, min_radius=0.5, extent=2.0)
+    assert np.hypot(table[..., 0], table[..., 1]).max() <= 2.0 + 1e-12
+    assert speeds(table).max() <= 0.8 + 1e-12
+    assert np.hypot(table[..., 7], table[..., 8]).max() <= 1.0 + 1e-12
+
+
+def test_a_least_radius_where_paths_reverse_is_refused():
+    with pytest.raises(ValidationError, match=r"a min_radius of 0\.2 m needs reversing 0, got 0\.25"):
+        RandomPaths(min_radius=0.2)
+
+
+def test_the_default_paths_stay_what_they_are():
+    """Where the first three end: results are published for them."""
+    ends = np.array(
+        [
+            [1.190711159885, 0.954523598291, 0.884315465611, -0.46688987704],
+            [-2.197769866037, 1.685336644953, -0.996383648089, 0.084968381305],
+            [1.912764541813, 2.035005540056, 0.891657758518, -0.452710107768],
+        ]
+    )
+    assert_allclose(samples(count=3)[:, -1, :4], ends, atol=1e-9)
+
+
 def test_any_draws_all_kinds_of_heading():
     table = samples(count=100, heading="any")
     fixed = (abs(table[..., 6]).max(axis=1) == 0.0).mean()
@@ -120,7 +171,8 @@ def test_easing_lowers_all_rates_and_rounds_them_down_to_two_digits():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"count": 0}, {"seed": -1}, {"extent": 0.0}, {"max_speed": -1.0}, {"heading": "sideways"}]
+    "wrong",
+    [{"count": 0}, {"seed": -1}, {"extent": 0.0}, {"max_speed": -1.0}, {"heading": "sideways"}, {"reversing": 1.1}],
 )
 def test_numbers_without_meaning_are_refused(wrong):
     with pytest.raises(ValidationError):

@@ -148,7 +148,7 @@ def _hardest(samples: Array, psi: Plane, time_step: float, robot: RobotParameter
     v_rate = (turning.real.copy(), turning.imag.copy(), alpha)
     directions = tuple((f.real.copy(), f.imag.copy()) for f in np.moveaxis(psi * back[..., None], -1, 0))
     force = inverse_dynamics(v, directions, v_rate, robot)
-    effort, lack = _least_effort(force, directions, robot)
+    effort, lack = least_effort(force, directions, robot)
     states = flatten(each(_motor_states, (v, effort), directions, robot.casters))
     use, torque, left, speed = (np.stack(column) for column in zip(*states, lack, strict=True))
     joint, moment = np.divmod(np.moveaxis(use, 0, 1).reshape(len(samples), -1).argmax(axis=1), samples.shape[1])
@@ -156,7 +156,7 @@ def _hardest(samples: Array, psi: Plane, time_step: float, robot: RobotParameter
     return use[here], joint, moment * time_step, torque[here], left[here], speed[here]
 
 
-def _least_effort(
+def least_effort(
     force: Vector, directions: tuple[Direction, ...], robot: RobotParameters
 ) -> tuple[Vector, tuple[Array, ...]]:
     """Vector y whose product with a motor's greatest wrench is the share of its torque to give; what is left undone.

@@ -7,7 +7,7 @@ defined everywhere, at rest and where it reverses too. Position is the integral 
 from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
-from pydantic import Field, NonNegativeInt, PositiveFloat
+from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen
 from caster_gym.paths.trajectory import Array, Plane, Trajectory, place, rest_to_rest, tabulate, whole_steps
@@ -16,7 +16,6 @@ RandomHeading = Literal["tangent", "fixed", "spinning", "profile"]
 
 _WAVES = 3  # harmonics of each smooth function
 _DRAWS = 6 * _WAVES + 10  # uniform numbers that make one path
-_REVERSING = 0.25  # share of the paths that change between forwards and backwards
 _SLOWEST = 0.3  # [-] of the limits; each path draws its share of them between this and 1
 
 
@@ -32,23 +31,41 @@ class RandomPaths(Frozen):
     max_acceleration: PositiveFloat = 1.0  # [m/s²]
     max_yaw_rate: PositiveFloat = 1.5  # [rad/s] of the heading and of the tangent
     heading: Literal["any"] | RandomHeading = "any"  # "any" draws one for each path
+    reversing: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25  # [-] share that changes between forwards and backwards
+    # [m] least radius of the tangent's turns, and least way over turn of the heading; None sets no bound
+    min_radius: PositiveFloat | None = None
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where all of them start, in the world
     rotation: float = 0.0  # [rad] of all of them about that point, headings included
+
+    @model_validator(mode="after")
+    def _radius_only_where_none_reverses(self) -> Self:
+        if self.min_radius is not None and self.reversing > 0.0:
+            raise ValueError(
+                f"a min_radius of {self.min_radius:g} m needs reversing 0, got {self.reversing:g}: "
+                f"where a path reverses it turns on the spot"
+            )
+        return self
 
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]:
         """All paths, timed. Time step in s."""
         steps = whole_steps(self.duration, time_step)
         draws = _Draws(np.random.default_rng(self.seed).random((self.count, _DRAWS)))
-        tangent, omega, alpha = self._turning(draws.wander(), steps, time_step)
-        v, v_rate = _speeds(draws, steps, time_step)
+        turning = self._turning(draws.wander(), steps, time_step)
+        v, v_rate = _speeds(draws, self.reversing, steps, time_step)
+        share = draws.between(_SLOWEST, 1.0)
+        # a path whose tangent turns less gets no farther than straight ahead, and needs no more acceleration
+        straight, straight_rate = v.astype(np.complex128), v_rate.astype(np.complex128)
+        farthest = _integral(straight, straight_rate, time_step)
+        least = share * self._largest(farthest, straight, v_rate + 1j * v * turning[1])
+        tangent, omega, alpha = self._widened(turning, least * v)
         direction = np.exp(1j * tangent)
         velocity, acceleration = v * direction, (v_rate + 1j * v * omega) * direction
         position = _integral(velocity, acceleration, time_step)
-        size = draws.between(_SLOWEST, 1.0) * self._largest(position, velocity, acceleration)
-        turning = self._headings(draws, steps, time_step, (tangent, omega, alpha))
+        size = share * self._largest(position, velocity, acceleration)
+        angle, rate, growth = self._headings(draws, steps, time_step, (tangent, omega, alpha), size * v)
         motion = (size * position, size * velocity, size * acceleration)
-        motion, heading = place(motion, np.exp(1j * turning[0]), self.centre, self.rotation)
-        samples = tabulate(motion, (heading, turning[1], turning[2]))
+        motion, heading = place(motion, np.exp(1j * angle), self.centre, self.rotation)
+        samples = tabulate(motion, (heading, rate, growth))
         return tuple(Trajectory(f"{self.shape} {k}", time_step, table) for k, table in enumerate(samples))
 
     def _largest(self, position: Plane, velocity: Plane, acceleration: Plane) -> Array:
@@ -66,8 +83,19 @@ class RandomPaths(Frozen):
         slower = self.max_yaw_rate / np.maximum(peak, self.max_yaw_rate)
         return start + slower * angle, slower * omega, slower * (second * rate**2 + first * acceleration)
 
+    def _widened(self, turning: tuple[Array, Array, Array], speed: Array) -> tuple[Array, Array, Array]:
+        """Angle, rate and acceleration with all turns scaled down until they keep to min_radius at these speeds."""
+        if self.min_radius is None:
+            return turning
+        angle, omega, alpha = turning
+        sharpest = np.max(
+            np.abs(omega[:, 1:-1]) / speed[:, 1:-1], axis=1, keepdims=True
+        )  # 1 / radius; ends are at rest
+        gentler = 1.0 / np.maximum(self.min_radius * sharpest, 1.0)
+        return angle[:, :1] + gentler * (angle - angle[:, :1]), gentler * omega, gentler * alpha
+
     def _headings(
-        self, draws: "_Draws", steps: int, time_step: float, along: tuple[Array, Array, Array]
+        self, draws: "_Draws", steps: int, time_step: float, along: tuple[Array, Array, Array], speed: Array
     ) -> tuple[Array, Array, Array]:
         """Angle, rate and acceleration (P, K + 1) of the body x-axis, of the kind asked for or drawn."""
         kinds = get_args(RandomHeading)
@@ -77,7 +105,7 @@ class RandomPaths(Frozen):
         coefficients = draws.wander()
         coefficients[:, 1:2] *= np.where(kind == kinds.index("fixed"), 0.0, 1.0)
         coefficients[:, 2:] *= np.where(kind == kinds.index("profile"), 1.0, 0.0)
-        own = self._turning(coefficients, steps, time_step)
+        own = self._widened(self._turning(coefficients, steps, time_step), speed)
         a, b, c = (np.where(kind == kinds.index("tangent"), t, o) for t, o in zip(along, own, strict=True))
         return a, b, c
 
@@ -129,11 +157,11 @@ def _series(coefficients: Array, x: Array) -> tuple[Array, Array, Array]:
     return value, first, second
 
 
-def _speeds(draws: _Draws, steps: int, time_step: float) -> tuple[Array, Array]:
+def _speeds(draws: _Draws, share: float, steps: int, time_step: float) -> tuple[Array, Array]:
     """Speed along the tangent and its rate (P, K + 1), before scaling: the quintic's bell times waves in time."""
     tau, duration = np.arange(steps + 1) / steps, steps * time_step
     _, bell, bell_rate = rest_to_rest(steps, time_step)
-    reversing = draws.between(0.0, 1.0) < _REVERSING
+    reversing = draws.between(0.0, 1.0) < share
     waves = draws.between(-1.0, 1.0, 2 * _WAVES)
     most = np.abs(waves).sum(axis=1, keepdims=True)
     level = np.where(reversing, draws.between(-0.2, 0.2), 1.0)

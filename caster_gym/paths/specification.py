@@ -60,18 +60,18 @@ def build_trajectories(
             raise ValueError(f"path {specification.shape!r}: {error}") from error
         check_feasible(specification, trajectories, robot)
         built.extend(trajectories)
-    return _with_names_of_their_own(built)
+    names = named_apart([one.name for one in built])
+    return tuple(one if one.name == name else replace(one, name=name) for one, name in zip(built, names, strict=True))
 
 
-def _with_names_of_their_own(trajectories: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
-    """The trajectories, with a number behind names that were there before."""
+def named_apart(names: Sequence[str]) -> list[str]:
+    """The names, with a number behind those that were there before."""
     seen: Counter[str] = Counter()
-    named = []
-    for one in trajectories:
-        seen[one.name] += 1
-        again = seen[one.name]
-        named.append(one if again == 1 else replace(one, name=f"{one.name} ({again})"))
-    return tuple(named)
+    apart = []
+    for name in names:
+        seen[name] += 1
+        apart.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return apart
 
 
 def _read(content: Mapping[str, Any], source: str) -> AnyPath:

@@ -1,0 +1,133 @@
+"""Paths to be followed at the robot's own pace: where they lead, and how fast the robot's motors can drive them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from caster_gym.paths.arc_length import LINE_COLUMNS, Line, between, line_along
+from caster_gym.paths.specification import AnyPath, named_apart, read_paths
+from caster_gym.paths.time_law import fastest_laws, row_times
+from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory, check_time_step, tabulate
+from caster_gym.robot import Robot
+
+COURSE_COLUMNS = (*LINE_COLUMNS, "square_speed")
+
+_FEWEST_SAMPLES = 1000  # of a path's own trajectory, from which its line is made
+_STEP = 0.5  # [-] of the spacing: greatest way between them; a cubic of 1 cm errs by 0.01 µm at a radius of 15 cm
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A path of C in the world frame by its arc length, and the law at which it is driven from rest to rest.
+
+    samples (K + 1, 10), read-only, with columns COURSE_COLUMNS: point [m], unit tangent, curvature, positive to the
+    left [1/m], heading as a unit vector, its slope dψ/ds [rad/m] and d²ψ/ds² [rad/m²], and ṡ² of the law [m²/s²], at
+    the arc lengths 0, spacing, … K · spacing. Between rows ṡ² is linear (s̈ is constant), the point follows the cubic
+    with the tangents of both rows, and the rest is linear, directions made unit again.
+    """
+
+    name: str
+    spacing: float  # [m]
+    samples: Array
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.samples, dtype=np.float64)
+        if samples.ndim != 2 or samples.shape[1] != len(COURSE_COLUMNS) or len(samples) < 2:
+            raise ValueError(f"samples of course {self.name!r} must have shape (K + 1, 10), got {samples.shape}")
+        if not np.isfinite(samples).all():
+            row, column = np.argwhere(~np.isfinite(samples))[0]
+            raise ValueError(f"{COURSE_COLUMNS[column]} of course {self.name!r} is {samples[row, column]} in row {row}")
+        _check_positive("spacing", self.spacing, "m")
+        samples.flags.writeable = False
+        object.__setattr__(self, "samples", samples)
+
+    @property
+    def length(self) -> float:
+        """Arc length from the first row to the last. [m]"""
+        return (len(self.samples) - 1) * self.spacing
+
+    @property
+    def duration(self) -> float:
+        """Time that the law takes from rest to rest. [s]"""
+        return float(row_times(self.samples[:, -1], self.spacing)[-1])
+
+    def timed(self, time_step: float) -> Trajectory:
+        """The course driven at its law, sampled at a constant time step [s]; the last sample rests at the end."""
+        check_time_step(time_step)
+        times, square = row_times(self.samples[:, -1], self.spacing), self.samples[:, -1]
+        steps = int(np.ceil(times[-1] / time_step - 1e-9))
+        if steps > MOST_STEPS:
+            raise ValueError(
+                f"course {self.name!r} takes {times[-1]:.3g} s, over {MOST_STEPS} steps of {time_step:g} s"
+            )
+        t = np.minimum(np.arange(steps + 1) * time_step, times[-1])
+        first = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+        since, speed = t - times[first], np.sqrt(square[first])
+        acceleration = (square[first + 1] - square[first]) / (2.0 * self.spacing)
+        way = (speed + 0.5 * acceleration * since) * since
+        rows = between(self.samples[:, :-1], self.spacing, np.clip(way / self.spacing, 0.0, 1.0), first)
+        rate, growth = speed + acceleration * since, acceleration
+        rate[-1] = growth[-1] = 0.0
+        point, tangent, heading = (rows[:, i] + 1j * rows[:, i + 1] for i in (0, 2, 5))
+        curvature, bend, bend_slope = rows[:, 4], rows[:, 7], rows[:, 8]
+        motion = point, rate * tangent, (growth + 1j * rate**2 * curvature) * tangent
+        turning: tuple[Plane, Array, Array] = heading, bend * rate, bend * growth + bend_slope * rate**2
+        return Trajectory(self.name, time_step, tabulate(motion, turning))
+
+
+def build_courses(
+    path: str | Mapping[str, Any] | AnyPath | Sequence[Any],
+    robot: Robot,
+    speed_limit: float,
+    free_heading: bool = False,
+    spacing: float = 0.02,
+    margin: float = 0.8,
+) -> tuple[Course, ...]:
+    """The courses of all paths; how long the paths themselves take does not matter.
+
+    speed_limit [m/s] of C along the path. free_heading: the heading stays what it is at the start. spacing [m] between
+    rows, changed a little so that it divides each length. margin: share of the motors' torque and speed that the law
+    may use.
+
+    Raises ValueError for a path that is too short, turns back on the spot or too sharply for the spacing, or along
+    which the robot cannot move; the message says where, and what would do.
+    """
+    _check_positive("speed_limit", speed_limit, "m/s")
+    _check_positive("spacing", spacing, "m")
+    if not 0.0 < margin <= 1.0:
+        raise ValueError(f"margin must be above 0 and at most 1, got {margin:g}")
+    lines: list[Line] = []
+    for specification in read_paths(path):
+        lines.extend(_lines(specification, spacing, free_heading))
+    names = named_apart([line.name for line in lines])
+    lines = [line._replace(name=name) for line, name in zip(lines, names, strict=True)]
+    laws = fastest_laws(lines, robot, speed_limit, margin)
+    return tuple(
+        Course(line.name, line.spacing, np.column_stack([line.rows, law]))
+        for line, law in zip(lines, laws, strict=True)
+    )
+
+
+def _lines(specification: AnyPath, spacing: float, free_heading: bool) -> list[Line]:
+    """The lines of one specification, from trajectories that are sampled finely enough."""
+    name: str = specification.shape
+    try:
+        trajectories = specification.trajectories(specification.duration / _FEWEST_SAMPLES)
+        ways = max(float(np.hypot(*t.samples[:, 4:6].T).max()) * t.time_step for t in trajectories)
+        if ways > _STEP * spacing:
+            samples = min(int(np.ceil(_FEWEST_SAMPLES * ways / (_STEP * spacing))), MOST_STEPS)
+            trajectories = specification.trajectories(specification.duration / samples)
+        lines = []
+        for trajectory in trajectories:
+            name = trajectory.name
+            lines.append(line_along(trajectory, spacing, free_heading))
+    except ValueError as error:
+        raise ValueError(f"path {name!r} makes no course: {error}") from error
+    return lines
+
+
+def _check_positive(name: str, value: float, unit: str) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be positive, got {value:g} {unit}")
