@@ -17,7 +17,12 @@ _HOMES = {"Model": "caster_gym.engines.numpy_model", "Robot": "caster_gym.robot"
 register(
     id="CasterTrack-v0",
     entry_point="caster_gym.envs.caster_track:CasterTrackEnv",
-    vector_entry_point="caster_gym.envs.caster_track_vector:CasterTrackVectorEnv",
+    vector_entry_point="caster_gym.envs.caster_track:CasterTrackVectorEnv",
+)
+register(
+    id="CasterFollow-v0",
+    entry_point="caster_gym.envs.caster_follow:CasterFollowEnv",
+    vector_entry_point="caster_gym.envs.caster_follow:CasterFollowVectorEnv",
 )
 
 

@@ -1,4 +1,4 @@
-"""caster_gym.envs.caster_track, .setup, .track_task, .tracking_engine: the single environment as its users meet it."""
+"""caster_gym.envs.caster_track, .caster_env, .setup, .track_task, .task_engine: the single one as its users meet it."""
 
 import warnings
 
@@ -12,7 +12,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 from caster_gym import Model, load_robot
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.setup import make_engine
+from caster_gym.envs.setup import track_engine
 
 ID = "caster_gym:CasterTrack-v0"
 CIRCLE = {"shape": "circle", "radius": 0.3, "duration": 6.0}  # 300 steps; a robot at rest stays within 0.65 m of it
@@ -140,7 +140,7 @@ def test_what_was_returned_belongs_to_the_caller():
         observation, info = results[0][0], results[0][-1]
         observation[:] = 9.0
         info["reward_terms"]["position"] = 9.0
-        for key in ("torque", "pose", "reference_pose"):
+        for key in ("torque", "pose", "reference_pose", "impulse"):
             info[key][:] = 9.0
         before = results[1]
         results = [env.step(np.full(6, 0.5, dtype=np.float32)) for env in (spoiled, clean)]
@@ -205,6 +205,7 @@ def test_a_state_that_is_not_finite_is_failure(place, bad):
     assert env.observation_space.contains(observation)
     observation, info = env.reset()
     assert env.observation_space.contains(observation)
+    assert info.pop("clearance") == np.inf  # there is no obstacle
     assert np.isfinite(flat(info)).all()
 
 
@@ -266,7 +267,7 @@ def test_a_pool_of_random_paths_is_drawn_from():
     env = CasterTrackEnv()
     env.reset(seed=0)
     drawn = {int((env.reset(), env.engine.paths[0])[1]) for _ in range(300)}
-    assert drawn == set(range(len(env.engine.trajectories)))  # each of 16 is missed with probability 4e-9
+    assert drawn == set(range(len(env.engine.plan.names)))  # each of 16 is missed with probability 4e-9
 
 
 def test_max_episode_steps_of_make_truncates():
@@ -330,10 +331,8 @@ def test_a_coarse_step_is_refused_for_the_robot_that_it_is_too_coarse_for():
 
 def test_trajectories_are_built_once_for_all_environments_of_a_process():
     """Thousand single environments do not hold thousand tables."""
-    first, second = (make_engine("chung2008", "random_paths", None, {}, count) for count in (1, 2))
-    assert first.trajectories is second.trajectories or all(
-        one is other for one, other in zip(first.trajectories, second.trajectories, strict=True)
-    )
+    (first, _), (second, _) = (track_engine("chung2008", "random_paths", None, None, {}, count) for count in (1, 2))
+    assert first.plan is second.plan
 
 
 def test_the_layout_in_the_docstring_is_the_layout_of_the_engine():
@@ -365,8 +364,3 @@ def test_work_of_the_motors_is_the_gain_of_energy():
 def test_preview_horizons_rise(preview):
     with pytest.raises(ValueError, match="preview horizons must rise"):
         CasterTrackEnv(preview=preview)
-
-
-def test_a_render_mode_is_refused():
-    with pytest.raises(ValueError, match="render_mode must be None, since this environment draws nothing, got 'human'"):
-        CasterTrackEnv(render_mode="human")

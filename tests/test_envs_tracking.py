@@ -1,4 +1,4 @@
-"""caster_gym.envs.tracking, .observation and their compiled form, against the same from angles and matrices."""
+"""caster_gym.envs.tracking and its compiled form, against the same from angles and matrices."""
 
 import warnings
 
@@ -11,9 +11,8 @@ from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.engines.numba_fleet import Fleet
 from caster_gym.envs import tracking
 from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.track_task import TrackTask
-from caster_gym.envs.tracking import Errors, Reference, Terms, Weights
+from caster_gym.envs.tracking import Errors, Record, Reference, Situation, Terms, Weights
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
@@ -33,7 +32,7 @@ class Moment:
         self.position, self.twist = self.state[:2], self.state[4:7]
         self.beta = np.arctan2(self.state[3], self.state[2])
         self.steering = np.arctan2(self.state[8::2], self.state[7::2])
-        table = env.engine.trajectories[0].samples
+        table = env.engine.plan.tables[0]
         self.reference = table[min(clock, len(table) - 1)]
         periods = [round(horizon / env.task.control_period) for horizon in env.task.preview]
         self.coming = [table[min(clock + k, len(table) - 1)] for k in periods]
@@ -52,7 +51,7 @@ def drive(robot, **task):
     observation, info = env.reset(seed=1)
     moments = [Moment(env, None, None, observation, None, info, 0)]
     rng = np.random.default_rng(2)
-    for clock in range(1, len(env.engine.trajectories[0].samples)):
+    for clock in range(1, len(env.engine.plan.tables[0])):
         before = env.engine.states[0]
         action = rng.uniform(-1.3, 1.3, env.action_space.shape).astype(np.float32)
         observation, reward, *_, info = env.step(action)
@@ -201,6 +200,7 @@ def by_the_docstring(distance, turn, speed, omega, shares, driven):
         "heading": 0.3 * k(2.0 * np.sin(turn / 2.0), 0.02),
         "speed": 0.2 * k(np.hypot(speed / 0.1, omega / 0.3), 1.0),
         "effort": -0.02 * np.square(shares).sum() / driven,
+        "impact": 0.0,
         "alive": 0.02,
     }
 
@@ -235,19 +235,44 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         reference = Reference(*map(float, m.reference))
         points = tuple(tuple(map(float, row[:7])) for row in m.coming)
         errors = tracking.tracking_errors(state, reference)
-        observation = tracking.observe(state, reference, errors, points, parameters)
-        torques = pairs(tuple(map(float, m.info["torque"])))
-        report = tracking.score(state, reference, errors, torques, m.info["power"], weights, parameters)
+        observation = tracking.observe(state, reference, errors, points, (), parameters)
         assert_array_equal(np.array(observation, dtype=np.float32), m.observation)
-        assert report.terms._asdict() == m.info["reward_terms"]
+        torques = pairs(tuple(map(float, m.info["torque"])))
+        record = untouched(m.info["power"])
+        ended = tracking.endings(state, errors, record, weights.corridor, weights.touching_ends)
+        terms = tracking.reward_terms(errors, tracking.mean_effort(torques, parameters), record, 0.0, weights)
+        assert terms._asdict() == m.info["reward_terms"]
+        situation = Situation(0.0, 0.0, np.inf)
+        report = tracking.report(state, reference, errors, torques, record, situation, ended, terms, parameters)
         assert report.position_error == m.info["position_error"]
         assert report.traction_use == m.info["traction_use"]
         assert report.conditioning == m.info["conditioning"]
-        assert (report.left_corridor, report.not_finite) == (0.0, 0.0)
+        assert report.endings == (0.0, 0.0, 0.0)
+        assert np.arctan2(report.heading_sin, report.heading_cos) == pytest.approx(m.info["heading_error"], abs=1e-15)
+        assert_array_equal(report.pose, m.info["pose"])
+        assert_array_equal(report.reference_pose, m.info["reference_pose"])
+
+
+def test_without_obstacles_nothing_touches(moments):
+    for m in moments:
+        assert (m.info["impacts"], m.info["normal_impulse"], m.info["touched"]) == (0.0, 0.0, False)
+        assert_array_equal(m.info["impulse"], [0.0, 0.0])
+        assert m.info["clearance"] == np.inf
+        assert (m.info["progress"], m.info["progress_share"]) == (0.0, 0.0)
+
+
+def untouched(power=0.0):
+    """The record of a control period without impacts."""
+    return Record(power, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 WEIGHTS = TrackTask().weights()
+WITH_IMPACTS = TrackTask(impact_weight=0.3, impact_scale=0.4).weights()
 NO_ERROR = Errors(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def reward_terms(errors, effort, failed=0.0, weights=WEIGHTS, pressing=0.0):
+    return tracking.reward_terms(errors, effort, untouched()._replace(pressing=pressing), failed, weights)
 
 
 def random_errors(count):
@@ -260,24 +285,40 @@ def random_errors(count):
 
 
 def test_reward_terms_stay_in_their_ranges():
-    for errors, effort in random_errors(2000):
-        terms = tracking.reward_terms(errors, effort, 0.0, WEIGHTS)
+    """Whatever the errors, the effort and the normal impulse [N s]."""
+    for k, (errors, effort) in enumerate(random_errors(2000)):
+        terms = reward_terms(errors, effort, 0.0, WITH_IMPACTS, pressing=(0.0, 1e-3 * k, 1e9)[k % 3])
         assert 0.0 < terms.position <= 0.5
         assert 0.0 < terms.heading <= 0.3
         assert 0.0 < terms.speed <= 0.2
         assert -0.02 <= terms.effort <= 0.0
-        assert terms.alive == 0.02
+        assert -0.3 <= terms.impact <= 0.0
+        assert terms.alive == 0.02 + 0.3
 
 
 def test_perfect_tracking_without_effort_is_worth_most():
-    assert sum(tracking.reward_terms(NO_ERROR, 0.0, 0.0, WEIGHTS)) == pytest.approx(1.02, abs=1e-15)
+    """All weights of quality and the one for being alive, which is as great as the greatest costs."""
+    assert sum(reward_terms(NO_ERROR, 0.0)) == pytest.approx(1.02, abs=1e-15)
+    assert sum(reward_terms(NO_ERROR, 0.0, 0.0, WITH_IMPACTS)) == pytest.approx(1.32, abs=1e-15)
 
 
 def test_surviving_always_beats_dying():
-    """No step in the task is worth less than nothing, whatever the errors and the effort; a failing one is worth 0."""
+    """No step in the task is worth less than nothing, whatever errors, effort and impacts; a failing one is worth 0."""
     for errors, effort in random_errors(2000):
-        assert sum(tracking.reward_terms(errors, effort, 0.0, WEIGHTS)) > 0.0
-        assert tracking.reward_terms(errors, effort, 1.0, WEIGHTS) == (0.0,) * len(Terms._fields)
+        for weights, pressing in ((WEIGHTS, 0.0), (WITH_IMPACTS, 0.1), (WITH_IMPACTS, 1e6)):
+            assert sum(reward_terms(errors, effort, 0.0, weights, pressing)) > 0.0
+            assert reward_terms(errors, effort, 1.0, weights, pressing) == (0.0,) * len(Terms._fields)
+
+
+def test_impacts_cost_what_the_documentation_says():
+    """−w J / (J + J₀), and nothing where the weight is 0, as it is by default."""
+    for pressing in (0.0, 0.01, 0.4, 3.0):
+        expected = -0.3 * pressing / (pressing + 0.4)
+        terms = reward_terms(NO_ERROR, 0.5, 0.0, WITH_IMPACTS, pressing)
+        assert terms.impact == pytest.approx(expected, abs=1e-15)
+        assert reward_terms(NO_ERROR, 0.5, 0.0, WEIGHTS, pressing) == reward_terms(NO_ERROR, 0.5)
+        same = reward_terms(NO_ERROR, 0.5, 0.0, WITH_IMPACTS)._replace(impact=terms.impact)
+        assert terms == same
 
 
 @pytest.mark.parametrize("name", ["ahead", "left", "turn", "vx", "vy", "omega"])
@@ -286,7 +327,7 @@ def test_each_error_alone_lowers_the_reward(name):
 
     def reward(size):
         change = {"cos": np.cos(size), "sin": np.sin(size)} if name == "turn" else {name: size}
-        return sum(tracking.reward_terms(NO_ERROR._replace(**change), 0.0, 0.0, WEIGHTS))
+        return sum(reward_terms(NO_ERROR._replace(**change), 0.0))
 
     sizes = np.linspace(0.0, np.pi, 300)
     for side in (sizes, -sizes):
@@ -294,7 +335,7 @@ def test_each_error_alone_lowers_the_reward(name):
 
 
 def test_effort_lowers_the_reward():
-    values = [sum(tracking.reward_terms(NO_ERROR, effort, 0.0, WEIGHTS)) for effort in np.linspace(0.0, 1.0, 11)]
+    values = [sum(reward_terms(NO_ERROR, effort)) for effort in np.linspace(0.0, 1.0, 11)]
     assert (np.diff(values) < 0.0).all()
 
 
@@ -316,7 +357,7 @@ def test_full_torque_everywhere_is_an_effort_of_one():
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5, -1.6])
 def test_the_corridor_is_a_circle(distance, outside, angle):
     ahead, left = (distance, 0.0) if np.isinf(distance) else (distance * np.cos(angle), distance * np.sin(angle))
-    assert tracking.left_corridor(NO_ERROR._replace(ahead=ahead, left=left), WEIGHTS) == outside
+    assert tracking.left_corridor(NO_ERROR._replace(ahead=ahead, left=left), WEIGHTS.corridor) == outside
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -330,29 +371,25 @@ def test_any_number_that_is_not_finite_is_noticed(bad):
             assert tracking.not_finite(unpack_state(tuple(broken))) == 1.0
 
 
+@pytest.mark.parametrize(("touching", "pressing", "ends"), [("ends", 1e-9, 1), ("ends", 0.0, 0), ("allowed", 5.0, 0)])
+def test_touching_ends_an_episode_only_where_the_task_says_so(touching, pressing, ends):
+    weights = TrackTask(touching=touching).weights()
+    assert tracking.touched(untouched()._replace(pressing=pressing), weights.touching_ends) == ends
+
+
+def test_an_obstacle_is_seen_from_the_robot():
+    """Gap, at most 1 m, and the direction from it turned into B; too far away it has none."""
+    state = unpack_state((1.0, 2.0, np.cos(0.7), np.sin(0.7), 0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 1.0))
+    gap, nx, ny = tracking.neighbour_seen(state, (0.4, np.cos(1.1), np.sin(1.1)))
+    assert_allclose([gap * 0.25, nx, ny], [0.4, np.cos(0.4), np.sin(0.4)], rtol=0.0, atol=EXACT)
+    assert tracking.neighbour_seen(state, (-0.01, 1.0, 0.0))[0] == -0.04
+    for far in (1.0, 3.0, np.inf):
+        assert tracking.neighbour_seen(state, (far, 1.0, 0.0)) == (4.0, 0.0, 0.0)
+
+
 def test_observed_numbers_stay_within_the_space():
     given = [-np.inf, -21.0, -20.0, 0.5, 20.0, 21.0, np.inf, np.nan]
     assert [tracking.observed(x) for x in given] == [-20, -20, -20, 0.5, 20, 20, 20, -20]
-
-
-@pytest.mark.parametrize("caster_count", [2, 3, 4])
-@pytest.mark.parametrize("preview", [(), (0.1,), (0.1, 0.2, 0.4)])
-def test_parts_of_the_observation_fill_it_without_gap(caster_count, preview):
-    layout = ObservationLayout(random_robot(303, caster_count), preview)
-    ends = [0]
-    for part in layout.parts:
-        assert part.place.start == ends[-1]
-        assert len(part.scale) == part.place.stop - part.place.start
-        ends.append(part.place.stop)
-    assert ends[-1] == layout.size == 13 + 4 * caster_count + 7 * len(preview)
-    assert len(layout.table().splitlines()) == 2 + len(layout.parts)
-    assert all(part.name in layout.table() for part in layout.parts)
-
-
-def test_a_batch_of_observations_is_decoded_along_its_last_axis():
-    layout = ObservationLayout(random_robot(304, 3), (0.1,))
-    batch = np.random.default_rng(5).normal(size=(2, 4, layout.size)).astype(np.float32)
-    assert_array_equal(layout.physical(batch, "twist")[1, 2], layout.physical(batch[1, 2], "twist"))
 
 
 def test_a_start_lies_in_the_frame_of_the_trajectory():
@@ -369,9 +406,11 @@ def test_a_start_lies_in_the_frame_of_the_trajectory():
 
 def test_weights_carry_every_number_of_the_task():
     """Each into the field that means it."""
-    fields = [name for name in Weights._fields if name not in ("coarse", "corridor")]
+    fields = [name for name in Weights._fields if name not in ("coarse", "corridor", "touching_ends")]
     named = {f"{name}_weight" if f"{name}_weight" in TrackTask.model_fields else name: name for name in fields}
     for i, (field, weight) in enumerate(named.items()):
         value = 0.111 * (i + 1)
         assert getattr(TrackTask(**{field: value}).weights(), weight) == value
-    assert TrackTask(coarse=7.0, corridor=0.9).weights()[-2:] == (7.0, 0.9)
+    weights = TrackTask(coarse=7.0, corridor=0.9).weights()
+    assert (weights.coarse, weights.corridor, weights.touching_ends) == (7.0, 0.9, 0.0)
+    assert TrackTask(touching="ends").weights().touching_ends == 1.0

@@ -1,6 +1,6 @@
-"""What the parts of a tracking observation mean: their places, units, frames and scales, by name."""
+"""What the parts of an observation mean: their places, units, frames and scales, by name."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,16 @@ class Part(NamedTuple):
 
 
 class ObservationLayout:
-    """Names the parts of the observations of one robot and preview, and turns them back into physical units.
+    """Names the parts of the observations of one robot and task, and turns them back into physical units.
 
     Agents that need physical quantities decode them from the observation: nobody sees more than anybody else.
+    preview: how far ahead the reference is shown, in seconds ("s") or metres along the path ("m"). nearest: number of
+    obstacles shown.
     """
 
-    def __init__(self, robot: Robot, preview: tuple[float, ...]) -> None:
+    def __init__(
+        self, robot: Robot, preview: tuple[float, ...], unit: Literal["s", "m"] = "s", nearest: int = 0
+    ) -> None:
         n = robot.caster_count
         speed, yaw = tracking.SPEED_UNIT, tracking.YAW_RATE_UNIT
         error, yaw_error = tracking.SPEED_ERROR_UNIT, tracking.YAW_RATE_ERROR_UNIT
@@ -33,6 +37,8 @@ class ObservationLayout:
         point = [tracking.PREVIEW_UNIT] * 2 + [1.0] * 2 + [speed] * 2 + [yaw]
         self.robot = robot
         self.preview = preview
+        self.unit = unit
+        self.nearest = nearest
         self._parts: dict[str, Part] = {}
         self._add("position_error", [tracking.POSITION_UNIT] * 2, "reference minus robot, ahead and left, in B [m]")
         self._add("heading_error", [1.0] * 2, "cos and sin of reference heading minus robot heading")
@@ -47,9 +53,17 @@ class ObservationLayout:
         self._add("joint_rates", rates, "θ̇_i, δ̇_i of each caster [rad/s]; observed as speeds r θ̇ and d δ̇")
         for horizon in preview:
             self._add(
-                f"preview_{horizon:g}s",
+                f"preview_{horizon:g}{unit}",
                 point,
-                "reference at that horizon: ahead, left [m], cos and sin of its heading, vx, vy [m/s], ω [rad/s], in B",
+                f"reference {horizon:g} {unit} ahead: ahead, left [m], cos and sin of its heading, vx, vy [m/s], "
+                "ω [rad/s], in B",
+            )
+        for k in range(1, nearest + 1):
+            self._add(
+                f"obstacle_{k}",
+                [tracking.GAP_UNIT, 1.0, 1.0],
+                f"nearest obstacle but {k - 1}: gap [m], direction from it to the robot, in B; farther than "
+                f"{tracking.GAP_LIMIT:g} m: that gap, and no direction",
             )
 
     def _add(self, name: str, scale: list[float], meaning: str) -> None:

@@ -1,62 +1,172 @@
 """From what a user names to an engine and its spaces, the same for one robot and for a batch."""
 
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium.spaces import Box
+from numpy.typing import NDArray
 
 from caster_gym.analysis.actuation import warn_if_singular
-from caster_gym.envs.track_task import read_task
-from caster_gym.envs.tracking import OBSERVATION_LIMIT
-from caster_gym.envs.tracking_engine import TrackingEngine
-from caster_gym.paths.specification import PathSpecification, build_trajectories, read_paths
-from caster_gym.paths.trajectory import Trajectory
+from caster_gym.arena.arena import Arena, read_arena
+from caster_gym.arena.beside import draw_beside
+from caster_gym.arena.checks import check_free
+from caster_gym.arena.packing import hull_of, pack
+from caster_gym.envs import follow_task, track_task
+from caster_gym.envs.follow_task import FollowTask
+from caster_gym.envs.following import FollowTerms
+from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.task import Task
+from caster_gym.envs.task_engine import Pace, Plan, TaskEngine, joined
+from caster_gym.envs.track_task import TrackTask
+from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
+from caster_gym.mechanics.separation import Surroundings
+from caster_gym.paths.course import build_courses
+from caster_gym.paths.specification import AnyPath, PathSpecification, build_trajectories, read_paths
 from caster_gym.robot import Robot, load_robot
 
 RobotLike: TypeAlias = str | Path | Robot
 PathLike: TypeAlias = (
     str | Mapping[str, Any] | PathSpecification | Sequence[str | Mapping[str, Any] | PathSpecification]
 )
+ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
+Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
 
 
-def make_engine(
+def track_engine(
     robot: RobotLike,
     path: PathLike,
-    actuation: str | Sequence[str] | None,
-    task: Mapping[str, Any],
+    actuation: Actuation,
+    arena: ArenaLike,
+    fields: Mapping[str, Any],
     count: int,
     longest: int | None = None,
-) -> TrackingEngine:
-    """The engine for so many robots; warns if the driven joints cannot push the robot somewhere."""
-    chosen = load_robot(robot)
-    if actuation is not None:
-        chosen = chosen.with_actuation(actuation if isinstance(actuation, str) else tuple(actuation))
-    checked = read_task(task)
-    warn_if_singular(chosen)
-    trajectories = _trajectories(read_paths(path), chosen, checked.control_period)
-    return TrackingEngine(chosen, trajectories, checked, count, longest)
+) -> tuple[TaskEngine, TrackTask]:
+    """The engine of the tracking task for so many robots; warns if the driven joints cannot push the robot somewhere.
+
+    longest: greatest number of control periods of an episode.
+    """
+    chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
+    plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
+    return TaskEngine(
+        chosen, plan, _pace(task), ObservationLayout(chosen, task.preview, "s", task.nearest), count
+    ), task
+
+
+def follow_engine(
+    robot: RobotLike,
+    path: PathLike,
+    actuation: Actuation,
+    arena: ArenaLike,
+    fields: Mapping[str, Any],
+    count: int,
+    longest: int | None = None,
+) -> tuple[TaskEngine, FollowTask]:
+    """The same for the following task."""
+    chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
+    plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)
+    return TaskEngine(
+        chosen, plan, _pace(task), ObservationLayout(chosen, task.preview, "m", task.nearest), count
+    ), task
 
 
 @lru_cache(maxsize=32)
-def _trajectories(paths: tuple[PathSpecification, ...], robot: Robot, period: float) -> tuple[Trajectory, ...]:
-    """Trajectories of specifications, shared between the environments of a process."""
-    return build_trajectories(paths, robot, period)
+def _track_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: TrackTask, longest: int | None) -> Plan:
+    """The plan of a tracking task, shared between the environments of a process."""
+    trajectories = build_trajectories(paths, robot, task.control_period)
+    tables = tuple(trajectory.samples for trajectory in trajectories)
+    samples, rows = joined(tables)
+    guide = Timetable(
+        samples,
+        _spans(rows, rows[:, 1] - rows[:, 0], longest),
+        np.array([round(s / task.control_period) for s in task.preview], dtype=np.int64),
+        task.weights(),
+    )
+    names = tuple(trajectory.name for trajectory in trajectories)
+    poses = tuple(table[:, :4] for table in tables)
+
+    def moment(_: int, k: int) -> str:
+        return f"at {k * task.control_period:.2f} s"
+
+    around, arenas = _arenas(arena, robot, names, poses, task, moment)
+    return Plan(guide, names, tables, Terms._fields, around, arenas)
 
 
-def observation_space(engine: TrackingEngine) -> "Box[np.float32]":
+@lru_cache(maxsize=32)
+def _follow_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: FollowTask, longest: int | None) -> Plan:
+    """The same for a following task."""
+    courses = build_courses(paths, robot, task.speed_limit, task.free_heading, margin=task.margin)
+    tables = tuple(course.samples for course in courses)
+    samples, rows = joined(tables)
+    periods = np.ceil([task.allowance * course.duration / task.control_period for course in courses])
+    guide = Courses(
+        samples,
+        _spans(rows, periods.astype(np.int64), longest),
+        np.array([course.spacing for course in courses]),
+        np.array(task.preview),
+        task.window,
+        task.stride,
+        task.arrival,
+        task.arrival_scale,
+        float(task.free_heading),
+        task.weights(),
+    )
+    names = tuple(course.name for course in courses)
+    poses = tuple(table[:, [0, 1, 5, 6]] for table in tables)
+
+    def arc(i: int, k: int) -> str:
+        return f"after {k * courses[i].spacing:.2f} m"
+
+    around, arenas = _arenas(arena, robot, names, poses, task, arc)
+    return Plan(guide, names, tables, FollowTerms._fields, around, arenas)
+
+
+def _arenas(
+    arena: Arena,
+    robot: Robot,
+    names: Sequence[str],
+    poses: Sequence[NDArray[np.float64]],
+    task: Task,
+    place: Callable[[int, int], str],
+) -> tuple[Surroundings, NDArray[np.int64]]:
+    """What is around each path, found free of it and of its starts; place(i, k) tells where pose k of path i is."""
+    hull = hull_of(robot)
+    swing = 2.0 * hull.reach * np.sin(0.5 * task.start_turn) if len(hull.faces) else 0.0
+    margin = float(task.start_reach + swing)
+    arenas = []
+    for i, (name, walked) in enumerate(zip(names, poses, strict=True)):
+        around = draw_beside(arena, hull, walked, i, name, margin)
+        check_free(around, hull, walked, name, margin, partial(place, i))
+        arenas.append(around)
+    obstacles, spans = pack(arenas)
+    return Surroundings(hull, obstacles), spans
+
+
+def _chosen(robot: RobotLike, actuation: Actuation) -> Robot:
+    chosen = load_robot(robot)
+    if actuation is not None:
+        chosen = chosen.with_actuation(actuation if isinstance(actuation, str) else tuple(actuation))
+    warn_if_singular(chosen)
+    return chosen
+
+
+def _pace(task: Task) -> Pace:
+    return Pace(task.substeps, task.time_step, task.corridor, task.start_offset, task.start_turn)
+
+
+def _spans(rows: NDArray[np.int64], periods: NDArray[np.int64], longest: int | None) -> NDArray[np.int64]:
+    """First row, last row and control periods of an episode on each path (paths, 3)."""
+    return np.column_stack([rows, periods if longest is None else np.minimum(periods, longest)])
+
+
+def observation_space(engine: TaskEngine) -> "Box[np.float32]":
     """Space of one robot's observation."""
     return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (engine.layout.size,), np.float32)
 
 
-def action_space(engine: TrackingEngine) -> "Box[np.float32]":
+def action_space(engine: TaskEngine) -> "Box[np.float32]":
     """Space of one robot's action: a share of its greatest torque for each driven motor."""
     return Box(-1.0, 1.0, (len(engine.robot.driven),), np.float32)
-
-
-def refuse_rendering(render_mode: str | None) -> None:
-    """Raises ValueError for any render mode, since there is none yet."""
-    if render_mode is not None:
-        raise ValueError(f"render_mode must be None, since this environment draws nothing, got {render_mode!r}")

@@ -1,4 +1,4 @@
-"""The tracking task for any number of robots, moved by compiled code; both environments are thin faces of this."""
+"""Every task for any number of robots, moved by compiled code; the environments are thin faces of this."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -9,12 +9,17 @@ from numpy.typing import NDArray
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.threads import over_blocks
-from caster_gym.envs import tracking_kernel as kernel
+from caster_gym.envs import task_kernel as kernel
+from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.track_task import TrackTask
-from caster_gym.envs.tracking import Terms
+from caster_gym.envs.scene import Scene
+from caster_gym.mechanics import ground
+from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.integration import unpack_state
+from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
-from caster_gym.paths.trajectory import Trajectory
+from caster_gym.mechanics.scalars import each, pairs
+from caster_gym.mechanics.separation import Surroundings
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
@@ -30,61 +35,86 @@ class Outcome(NamedTuple):
     reports: NDArray[np.float64]  # (quantities, robots)
 
 
-class TrackingEngine:
-    """Robots of one kind, each following one of several timed trajectories."""
+class Plan(NamedTuple):
+    """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
 
-    def __init__(
-        self, robot: Robot, trajectories: Sequence[Trajectory], task: TrackTask, count: int, longest: int | None = None
-    ) -> None:
-        robot.check_time_step(task.time_step)
+    guide: Timetable | Courses
+    names: tuple[str, ...]  # of the paths
+    tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
+    terms: tuple[str, ...]  # names of the reward's terms
+    around: Surroundings
+    arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
+
+
+class Pace(NamedTuple):
+    """What the engine needs to know of a task."""
+
+    substeps: int
+    time_step: float  # [s]
+    corridor: float  # [m]
+    start_offset: float  # [m]
+    start_turn: float  # [rad]
+
+
+class TaskEngine:
+    """Robots of one kind, each on one of several paths.
+
+    on_restart: functions that are called with the indices of robots that start a new episode, before they are placed.
+    """
+
+    def __init__(self, robot: Robot, plan: Plan, pace: Pace, layout: ObservationLayout, count: int) -> None:
+        robot.check_time_step(pace.time_step)
         announce_compilation(kernel.restart, "the environment")
-        self.robot, self.task, self.count = robot, task, count
-        self.trajectories = tuple(trajectories)
-        self.layout = ObservationLayout(robot, task.preview)
-        self._casters = tuple(range(robot.caster_count))
-        self._preview = tuple(range(len(task.preview)))
-        self._spread = np.array([task.start_offset, task.start_turn])
+        self.robot, self.plan, self.layout, self.count = robot, plan, layout, count
+        self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
+        self._pace = pace
+        self._sizes = kernel.Sizes(
+            tuple(range(robot.caster_count)), tuple(range(len(layout.preview))), tuple(range(layout.nearest))
+        )
+        self._spread = np.array([pace.start_offset, pace.start_turn])
         self._report_rows = kernel.FIXED_REPORT_ROWS + 2 * robot.caster_count
-        samples, spans = _table(self.trajectories, longest)
+        nominal = np.array([pack_parameters(robot_parameters(robot))])
+        self._parameter_row = kernel.parameter_row(self._sizes)
+        blocks = np.zeros((block_count(count), (self._parameter_row + nominal.shape[1]) * LANES))
+        to_lanes(np.repeat(nominal, count, axis=0), blocks, self._parameter_row)
         self._world = kernel.World(
-            blocks=self._fresh_blocks(),
+            blocks=blocks,
             clocks=np.zeros((2, count), dtype=np.int64),
             seeds=np.zeros((2, count), dtype=np.uint64),
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
-            samples=samples,
-            spans=spans,
-            horizons=np.array([round(s / task.control_period) for s in task.preview], dtype=np.int64),
-            substeps=task.substeps,
-            time_step=task.time_step,
+            guide=plan.guide,
+            hull=plan.around.hull,
+            obstacles=plan.around.obstacles if len(plan.around.obstacles.radii) else None,
+            arenas=plan.arenas,
+            substeps=pace.substeps,
+            time_step=pace.time_step,
         )
-
-    def _fresh_blocks(self) -> NDArray[np.float64]:
-        """Blocks that hold the weights and the robot's parameters."""
-        fixed = np.array([(*self.task.weights(), *pack_parameters(robot_parameters(self.robot)))])
-        first = kernel.weight_row(self._casters, self._preview)
-        blocks = np.zeros((block_count(self.count), (first + fixed.shape[1]) * LANES))
-        to_lanes(np.repeat(fixed, self.count, axis=0), blocks, first)
-        return blocks
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
         self._world.seeds[:, robot] = key, 0
+
+    def episodes(self, selected: NDArray[np.int64]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+        """Key, and number of the episode that is about to start, of some robots; random draws count from them."""
+        return self._world.seeds[0, selected], self._world.seeds[1, selected]
 
     def restart(
         self, selected: NDArray[np.int64], into: Outcome | None = None, path: int | NDArray[np.int64] = DRAW_A_PATH
     ) -> Outcome:
         """Start new episodes of the selected robots; the others' entries are those of `into`, or zero.
 
-        path: index of the trajectory to follow, for all or for each of the selected; DRAW_A_PATH draws one.
+        path: index of the path to follow, for all or for each of the selected; DRAW_A_PATH draws one.
         """
+        for prepare in self.on_restart:
+            prepare(selected)
         outcome = self._empty() if into is None else into
         views = kernel.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
-        kernel.restart(selected, paths, self._world, self._spread, views, self._casters, self._preview)
+        kernel.restart(selected, paths, self._world, self._spread, views, self._sizes)
         return outcome
 
     def checked_path(self, path: Any) -> NDArray[np.int64]:
-        """Indices of trajectories, one a robot. Raises ValueError for one that is not there or no whole number."""
+        """Indices of paths, one a robot. Raises ValueError for one that is not there or no whole number."""
         wanted = np.asarray(path)
         if wanted.shape not in ((), (self.count,)):
             raise ValueError(f"path must be one number or an array of shape ({self.count},), got shape {wanted.shape}")
@@ -92,9 +122,9 @@ class TrackingEngine:
             wanted.dtype.kind not in "iu"
             or wanted.size == 0
             or wanted.min() < DRAW_A_PATH
-            or wanted.max() >= len(self.trajectories)
+            or wanted.max() >= len(self.plan.names)
         ):
-            raise ValueError(f"path must be a whole number in 0 … {len(self.trajectories) - 1}, got {path!r}")
+            raise ValueError(f"path must be a whole number in 0 … {len(self.plan.names) - 1}, got {path!r}")
         return np.broadcast_to(wanted.astype(np.int64), (self.count,))
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
@@ -102,7 +132,7 @@ class TrackingEngine:
         observations = np.empty((self.count, self.layout.size), dtype=np.float32)
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
-        arguments = (self._world, actions, kernel.Views(observations, reports, results), self._casters, self._preview)
+        arguments = (self._world, actions, kernel.Views(observations, reports, results), self._sizes)
         if self.count == 1:
             kernel.step_single(*arguments)
         else:
@@ -123,50 +153,116 @@ class TrackingEngine:
     @property
     def states(self) -> NDArray[np.float64]:
         """A copy of all states (robots, 7 + 2 N), laid out as in `caster_gym.engines.numba_fleet.Fleet`."""
-        return from_lanes(self._world.blocks, 0, kernel.command_row(self._casters), self.count)
+        return from_lanes(self._world.blocks, 0, kernel.room_row(self._sizes), self.count)
 
     @states.setter
     def states(self, value: NDArray[np.float64]) -> None:
         to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, 0)
+        if self._world.obstacles is not None:
+            to_lanes(np.zeros((self.count, 1)), self._world.blocks, kernel.room_row(self._sizes))
+
+    @property
+    def wrenches(self) -> NDArray[np.float64]:
+        """External wrenches (robots, 3) at C, in B [N, N, N m], as a copy.
+
+        They act until they are set again; an episode starts without any, whatever was set before its first step.
+        """
+        return from_lanes(self._world.blocks, kernel.wrench_row(self._sizes), 3, self.count)
+
+    @wrenches.setter
+    def wrenches(self, value: NDArray[np.float64]) -> None:
+        if np.shape(value) != (self.count, 3):
+            raise ValueError(f"wrenches must have shape {(self.count, 3)}, got {np.shape(value)}")
+        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, kernel.wrench_row(self._sizes))
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """Every robot's numbers (robots, fields), in the order of `pack_parameters`, as a copy."""
+        width = self._world.blocks.shape[1] // LANES - self._parameter_row
+        return from_lanes(self._world.blocks, self._parameter_row, width, self.count)
+
+    def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64]) -> None:
+        """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`."""
+        changed = self.parameters
+        if rows.shape != (len(selected), changed.shape[1]):
+            raise ValueError(f"rows must have shape {(len(selected), changed.shape[1])}, got {rows.shape}")
+        changed[selected] = rows
+        to_lanes(changed, self._world.blocks, self._parameter_row)
 
     @property
     def paths(self) -> NDArray[np.int64]:
-        """Which trajectory each robot follows (robots,), as a copy."""
+        """Which path each robot follows (robots,), as a copy."""
         return np.array(self._world.clocks[1])
 
+    def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
+        """Named quantities of all robots: arrays (robots,) or (robots, width), reward terms in a dictionary."""
+        return self._named(reports, lambda first, end: reports[first:end].T)
 
-def _table(trajectories: Sequence[Trajectory], longest: int | None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """All trajectories in one table (rows, 10), with each one's first and last row and control periods (paths, 3)."""
-    lengths = np.array([len(t.samples) for t in trajectories])
+    def info_of_one(self, report: NDArray[np.float64]) -> dict[str, Any]:
+        """Named quantities of one robot: numbers or arrays (width,), reward terms in a dictionary."""
+        return self._named(report.tolist(), lambda first, end: report[first:end])
+
+    def _named(self, row: Any, rows: Callable[[int, int], NDArray[np.float64]]) -> dict[str, Any]:
+        terms, pose = kernel.FIRST_TERM, kernel.FIRST_POSE
+        record, situation = kernel.FIRST_RECORD, kernel.FIRST_SITUATION
+        return {
+            "position_error": row[3],
+            "heading_error": row[kernel.HEADING_SIN],
+            "reward_terms": {name: row[terms + i] for i, name in enumerate(self.plan.terms)},
+            "torque": rows(kernel.FIXED_REPORT_ROWS, len(row)),
+            "power": row[record],
+            "traction_use": row[6],
+            "conditioning": row[7],
+            "pose": rows(pose, pose + 4),
+            "reference_pose": rows(pose + 4, pose + 8),
+            "progress": row[situation],
+            "progress_share": row[situation + 1],
+            "clearance": row[situation + 2],
+            "impacts": row[record + 6],
+            "impulse": rows(record + 1, record + 3),
+            "normal_impulse": row[record + 3],
+            "left_corridor": row[0] > 0.0,
+            "not_finite": row[1] > 0.0,
+            "touched": row[2] > 0.0,
+        }
+
+    def scene(self, robot: int) -> Scene:
+        """What there is to see of one robot."""
+        state = self.states[robot]
+        row = self._world.blocks[robot // LANES].reshape(-1, LANES)[:, robot % LANES]
+        report = row[kernel.report_row(self._sizes) : self._parameter_row]
+        path = int(self._world.clocks[1, robot])
+        near, end = self.plan.arenas[path]
+        record = report[kernel.FIRST_RECORD :]
+        return Scene(
+            robot=self.robot,
+            time=float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
+            pose=state[:4],
+            twist=state[4:7],
+            directions=state[7:].reshape(-1, 2),
+            torque=report[kernel.FIXED_REPORT_ROWS :].copy(),
+            ground_forces=self._ground_forces(state, report[kernel.FIXED_REPORT_ROWS :]),
+            path=self.plan.tables[path][:, :2],
+            corridor=self._pace.corridor,
+            reference=report[kernel.FIRST_POSE + 4 : kernel.FIRST_POSE + 8].copy(),
+            obstacles=self.plan.around.obstacles._replace(
+                radii=self.plan.around.obstacles.radii[near:end], spans=self.plan.around.obstacles.spans[near:end]
+            ),
+            impulse=record[1:3].copy(),
+            impact_point=record[4:6].copy() if record[6] > 0.0 else np.full(2, np.nan),
+            failed=bool(report[: kernel.ENDINGS].any()),
+        )
+
+    def _ground_forces(self, state: NDArray[np.float64], torque: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces (N, 2) of the floor on each wheel along its rolling direction and to its left. [N]"""
+        parameters, now = robot_parameters(self.robot), unpack_state(tuple(state.tolist()))
+        at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
+        rate = forward_dynamics(now.twist, now.directions, at_joints, (0.0, 0.0, 0.0), parameters)
+        return np.array(each(ground.ground_force, (now.twist, rate), now.directions, parameters.casters, at_joints))
+
+
+def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """All tables of paths in one (rows, columns), with each one's first and last row (paths, 2)."""
+    lengths = np.array([len(table) for table in tables])
     ends = np.cumsum(lengths)
-    periods = lengths - 1 if longest is None else np.minimum(lengths - 1, longest)
-    samples = np.ascontiguousarray(np.concatenate([t.samples for t in trajectories]))
-    return samples, np.stack([ends - lengths, ends - 1, periods], axis=1).astype(np.int64)
-
-
-def info_of(reports: NDArray[np.float64]) -> dict[str, Any]:
-    """Named quantities of all robots: arrays (robots,) or (robots, width), reward terms in a dictionary."""
-    return _named(reports, lambda first, end: reports[first:end].T)
-
-
-def info_of_one(report: NDArray[np.float64]) -> dict[str, Any]:
-    """Named quantities of one robot: numbers or arrays (width,), reward terms in a dictionary."""
-    return _named(report.tolist(), lambda first, end: report[first:end])
-
-
-def _named(row: Any, rows: Callable[[int, int], NDArray[np.float64]]) -> dict[str, Any]:
-    terms = kernel.FIRST_TERM
-    pose = terms + kernel.TERMS
-    return {
-        "position_error": row[2],
-        "heading_error": row[kernel.HEADING_SIN],
-        "reward_terms": {name: row[terms + i] for i, name in enumerate(Terms._fields)},
-        "torque": rows(kernel.FIXED_REPORT_ROWS, len(row)),
-        "power": row[5],
-        "traction_use": row[6],
-        "conditioning": row[7],
-        "pose": rows(pose, pose + 4),
-        "reference_pose": rows(pose + 4, pose + 8),
-        "left_corridor": row[0] > 0.0,
-        "not_finite": row[1] > 0.0,
-    }
+    return np.ascontiguousarray(np.concatenate(tables)), np.stack([ends - lengths, ends - 1], axis=1).astype(np.int64)

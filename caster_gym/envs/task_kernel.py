@@ -1,44 +1,42 @@
-"""The compiled step of the tracking task: how its quantities lie in a block, and the loops over the block's robots.
+"""The compiled step of every task: how its quantities lie in a block, and the loops over the block's robots.
 
-Rows of a block: state, motor commands, mean motor torques, mean power, reference, preview, observation, report,
-weights, robot parameters. `casters` and `preview` are any tuples with an item per caster and per previewed point:
-their lengths are part of their types, so that all rows are constants of the compiled code.
+Rows of a block: state, room, wrench, motor commands, mean motor torques, record, reference, preview, situation, nearest
+obstacles, observation, report, robot parameters. The tuples in `Sizes` have an item per caster, per previewed point and
+per observed obstacle: their lengths are part of their types, so that all rows are constants of the compiled code.
 """
 
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
+from numba import types
+from numba.extending import overload, register_jitable
 
+from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
 from caster_gym.engines.lanes import BODY_ROWS, LANES, counting, read, read_pairs, read_robot, read_state, write
-from caster_gym.engines.numba_compiler import INLINE, compiled, teach
-from caster_gym.envs import randomness, tracking
+from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
+from caster_gym.envs import randomness
+from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge
 from caster_gym.envs.randomness import uniform
-from caster_gym.envs.tracking import (
-    Reference,
-    Weights,
-    flat_report,
-    observe,
-    score,
-    start,
-    tracking_errors,
-)
-from caster_gym.mechanics.integration import pack_state
-from caster_gym.mechanics.plant import driven_step
-from caster_gym.mechanics.scalars import add, each, flatten
+from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
+from caster_gym.mechanics.integration import State, pack_state
+from caster_gym.mechanics.plant import driven_step, guarded_driven_step
+from caster_gym.mechanics.scalars import add, each, flatten, where
+from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
 
-REFERENCE_ROWS = len(Reference._fields)
-POINT_ROWS = 7
-WEIGHT_ROWS = len(Weights._fields)
-FIXED_REPORT_ROWS = 21
-HEADING_SIN, HEADING_COS, FIRST_TERM, TERMS = 3, 4, 8, 5
+RECORD_ROWS = len(Record._fields)
+SITUATION_ROWS = len(Situation._fields)
+NEIGHBOUR_ROWS = 3
+FIXED_REPORT_ROWS = 32
+HEADING_SIN, HEADING_COS, FIRST_TERM, TERMS, FIRST_POSE, FIRST_RECORD, FIRST_SITUATION = 4, 5, 8, 6, 14, 22, 29
+ENDINGS = 3
 
 _REFERENCE = (0.0,) * REFERENCE_ROWS
 _POINT = (0.0,) * POINT_ROWS
-_WEIGHTS = (0.0,) * WEIGHT_ROWS
+_RECORD = (0.0,) * RECORD_ROWS
+_SITUATION = (0.0,) * SITUATION_ROWS
+_NEIGHBOUR = (0.0,) * NEIGHBOUR_ROWS
 
-teach(tracking)
 teach(randomness)
 
 
@@ -49,9 +47,10 @@ class World(NamedTuple):
     clocks: Any  # int64 (2, robots): control periods done, path
     seeds: Any  # uint64 (2, robots): key, episode
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
-    samples: Any  # float64 (rows of all paths, 10)
-    spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
-    horizons: Any  # int64 (previewed points,): control periods ahead
+    guide: Any  # Timetable or Courses
+    hull: Hull
+    obstacles: Obstacles | None
+    arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
     substeps: Any
     time_step: Any  # [s]
 
@@ -64,46 +63,100 @@ class Views(NamedTuple):
     results: Any  # float64 (3, robots): reward, terminated, truncated
 
 
-@register_jitable(**INLINE)
-def command_row(casters: Any) -> int:
-    """First row of the motor commands; those of the mean motor torques and of the power follow."""
-    return BODY_ROWS + 2 * len(casters)
+class Sizes(NamedTuple):
+    """As many items as there are casters, previewed points, and obstacles in an observation."""
+
+    casters: tuple[int, ...]
+    preview: tuple[int, ...]
+    nearest: tuple[int, ...]
 
 
 @register_jitable(**INLINE)
-def torque_row(casters: Any) -> int:
-    """First row of the mean motor torques [N m], with the mean power [W] behind them."""
-    return command_row(casters) + 2 * len(casters)
+def room_row(sizes: Sizes) -> int:
+    """Row of the room, see `caster_gym.engines.guarding`."""
+    return BODY_ROWS + 2 * len(sizes.casters)
 
 
 @register_jitable(**INLINE)
-def reference_row(casters: Any) -> int:
+def wrench_row(sizes: Sizes) -> int:
+    """First row of the external wrench at C, in B."""
+    return room_row(sizes) + 1
+
+
+@register_jitable(**INLINE)
+def command_row(sizes: Sizes) -> int:
+    """First row of the motor commands."""
+    return wrench_row(sizes) + 3
+
+
+@register_jitable(**INLINE)
+def torque_row(sizes: Sizes) -> int:
+    """First row of the mean motor torques [N m]."""
+    return command_row(sizes) + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def record_row(sizes: Sizes) -> int:
+    """First row of the record of the control period."""
+    return torque_row(sizes) + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def reference_row(sizes: Sizes) -> int:
     """First row of the reference, with the previewed points behind it."""
-    return torque_row(casters) + 2 * len(casters) + 1
+    return record_row(sizes) + RECORD_ROWS
 
 
 @register_jitable(**INLINE)
-def observation_row(casters: Any, preview: Any) -> int:
+def situation_row(sizes: Sizes) -> int:
+    """First row of the situation."""
+    return reference_row(sizes) + REFERENCE_ROWS + POINT_ROWS * len(sizes.preview)
+
+
+@register_jitable(**INLINE)
+def nearest_row(sizes: Sizes) -> int:
+    """First row of the nearest obstacles."""
+    return situation_row(sizes) + SITUATION_ROWS
+
+
+@register_jitable(**INLINE)
+def observation_row(sizes: Sizes) -> int:
     """First row of the observation."""
-    return reference_row(casters) + REFERENCE_ROWS + POINT_ROWS * len(preview)
+    return nearest_row(sizes) + NEIGHBOUR_ROWS * len(sizes.nearest)
 
 
 @register_jitable(**INLINE)
-def report_row(casters: Any, preview: Any) -> int:
+def report_row(sizes: Sizes) -> int:
     """First row of the report."""
-    return observation_row(casters, preview) + 13 + 4 * len(casters) + POINT_ROWS * len(preview)
+    points = POINT_ROWS * len(sizes.preview) + NEIGHBOUR_ROWS * len(sizes.nearest)
+    return observation_row(sizes) + 13 + 4 * len(sizes.casters) + points
 
 
 @register_jitable(**INLINE)
-def weight_row(casters: Any, preview: Any) -> int:
-    """First row of the reward's weights."""
-    return report_row(casters, preview) + FIXED_REPORT_ROWS + 2 * len(casters)
-
-
-@register_jitable(**INLINE)
-def parameter_row(casters: Any, preview: Any) -> int:
+def parameter_row(sizes: Sizes) -> int:
     """First row of the robot's parameters, the last ones."""
-    return weight_row(casters, preview) + WEIGHT_ROWS
+    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def _borrowed_world(w: World) -> World:
+    return World(
+        borrowed(w.blocks),
+        borrowed(w.clocks),
+        borrowed(w.seeds),
+        borrowed(w.slots),
+        borrowed_guide(w.guide),
+        borrowed_hull(w.hull),
+        borrowed_obstacles(w.obstacles),
+        borrowed(w.arenas),
+        w.substeps,
+        w.time_step,
+    )
+
+
+@register_jitable(**INLINE)
+def _borrowed_views(v: Views) -> Views:
+    return Views(borrowed(v.observations), borrowed(v.reports), borrowed(v.results))
 
 
 @register_jitable(**INLINE)
@@ -112,22 +165,137 @@ def _scaled(factor: Any, number: Any) -> Any:
 
 
 @register_jitable(**INLINE)
-def _drive(block: Any, lanes: Any, substeps: Any, h: Any, casters: Any, preview: Any) -> None:
-    """Let the robots move for a control period under their commands."""
-    rows = torque_row(casters)
-    share = 1.0 / substeps
-    for row in range(rows, reference_row(casters)):
+def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
+    """Let robots, the first of the batch's in this block being `first`, move for a control period."""
+    rows, room_at, h, reach = torque_row(sizes), room_row(sizes), world.time_step, world.hull.reach
+    share = 1.0 / world.substeps
+    for row in range(rows, reference_row(sizes)):
         for lane in range(lanes):
             block[row * LANES + lane] = 0.0
-    for _ in range(substeps):
+    for _ in range(world.substeps):
+        _measure(block, first, here, world.obstacles, world, sizes)
         for lane in range(lanes):
-            state = read_state(block, lane, 0, casters)
-            commands = read_pairs(block, lane, command_row(casters), casters)
-            robot = read_robot(block, lane, parameter_row(casters, preview), casters)
-            state, drive = driven_step(state, commands, (0.0, 0.0, 0.0), h, robot)
-            mean = each(_scaled, (share,), (*flatten(drive.torques), drive.power))
-            write(block, lane, 0, pack_state(state))
+            state = read_state(block, lane, 0, sizes.casters)
+            commands = read_pairs(block, lane, command_row(sizes), sizes.casters)
+            wrench = read(block, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
+            robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+            target, drive = driven_step(state, commands, wrench, h, robot)
+            end, room, went = settled(world.obstacles, block[room_at * LANES + lane], state, target, h, reach)
+            mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
+            write(block, lane, 0, end)
             write(block, lane, rows, add(read(block, lane, rows, mean), mean))
+            block[room_at * LANES + lane] = room
+        _take_care(block, first, here, share, world.obstacles, world, sizes)
+
+
+def _measure(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> None:
+    """Measure the room of robots that may soon need to know it."""
+    raise NotImplementedError
+
+
+def _take_care(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> None:
+    """Step the robots that may touch something."""
+    raise NotImplementedError
+
+
+def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
+    """Write the nearest obstacles; returns the gap to the nearest one. [m]"""
+    raise NotImplementedError
+
+
+@overload(_measure, jit_options=INLINE, strict=False)
+def _measure_compiled(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
+    if isinstance(obstacles, types.NoneType):
+        return lambda block, first, here, obstacles, world, sizes: None
+
+    def among(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> None:
+        row = room_row(sizes)
+        for lane in range(here):
+            state = read_state(block, lane, 0, sizes.casters)
+            if worth_measuring(block[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
+                near, end = _neighbourhood(first + lane, world)
+                gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
+                block[row * LANES + lane] = gap
+
+    return among
+
+
+@overload(_take_care, jit_options=INLINE, strict=False)
+def _take_care_compiled(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
+    if isinstance(obstacles, types.NoneType):
+        return lambda block, first, here, share, obstacles, world, sizes: None
+
+    def among(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> None:
+        for lane in range(here):
+            if block[room_row(sizes) * LANES + lane] < 0.0:
+                near, end = _neighbourhood(first + lane, world)
+                careful_step(block, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
+
+    return among
+
+
+@overload(_look_around, jit_options=INLINE, strict=False)
+def _look_around_compiled(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
+    if isinstance(obstacles, types.NoneType):
+        return lambda block, lane, robot, state, obstacles, world, sizes: math.inf
+
+    def among(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
+        near, end = _neighbourhood(robot, world)
+        gap = math.inf
+        for k in range(near, end):
+            apart = separation(state.position, state.heading, world.hull, obstacles, k)
+            gap = min(apart.gap, gap)
+            _insert(block, lane, nearest_row(sizes), apart.gap, apart.nx, apart.ny, sizes)
+        return gap
+
+    return among
+
+
+@register_jitable(**INLINE)
+def _neighbourhood(robot: Any, world: World) -> Any:
+    """First and end of the obstacles that a robot may meet."""
+    path = world.clocks[1, robot]
+    return world.arenas[path, 0], world.arenas[path, 1]
+
+
+def _careful_step(
+    block: Any,
+    lane: Any,
+    share: Any,
+    near: Any,
+    end: Any,
+    hull: Hull,
+    obstacles: Obstacles,
+    h: Any,
+    sizes: Sizes,
+) -> None:
+    """One substep of a robot that may touch something."""
+    hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
+    state = read_state(block, lane, 0, sizes.casters)
+    commands = read_pairs(block, lane, command_row(sizes), sizes.casters)
+    wrench = read(block, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
+    robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+    state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end)
+    mean = each(_scaled, (share,), (*flatten(drive.torques), drive.power))
+    write(block, lane, 0, pack_state(state))
+    rows = torque_row(sizes)
+    write(block, lane, rows, add(read(block, lane, rows, mean), mean))
+    done = Record(*read(block, lane, record_row(sizes), _RECORD))
+    hit = touch.impacts > 0.0
+    write(
+        block,
+        lane,
+        record_row(sizes) + 1,
+        (
+            done.impulse_x + touch.impulse[0],
+            done.impulse_y + touch.impulse[1],
+            done.pressing + touch.pressing,
+            where(hit, touch.point[0], done.point_x),
+            where(hit, touch.point[1], done.point_y),
+            done.impacts + touch.impacts,
+        ),
+    )
+    block[room_row(sizes) * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
 
 
 @register_jitable(**INLINE)
@@ -136,47 +304,62 @@ def _read_point(block: Any, lane: Any, row: Any, index: Any) -> Any:
 
 
 @register_jitable(**INLINE)
-def _look(block: Any, first: Any, lanes: Any, casters: Any, preview: Any) -> None:
+def _read_neighbour(block: Any, lane: Any, row: Any, index: Any) -> Any:
+    return read(block, lane, row + NEIGHBOUR_ROWS * index, _NEIGHBOUR)
+
+
+@register_jitable(**INLINE)
+def _look(block: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
     """Observe and score robots whose reference has been fetched."""
     for i in range(lanes):
         lane = first + i
-        state = read_state(block, lane, 0, casters)
-        torques = read_pairs(block, lane, torque_row(casters), casters)
-        (power,) = read(block, lane, torque_row(casters) + 2 * len(casters), (0.0,))
-        reference = Reference(*read(block, lane, reference_row(casters), _REFERENCE))
-        points = each(_read_point, (block, lane, reference_row(casters) + REFERENCE_ROWS), counting(preview))
-        weights = Weights(*read(block, lane, weight_row(casters, preview), _WEIGHTS))
-        robot = read_robot(block, lane, parameter_row(casters, preview), casters)
-        errors = tracking_errors(state, reference)
-        observation = observe(state, reference, errors, points, robot)
-        report = score(state, reference, errors, torques, power, weights, robot)
-        write(block, lane, observation_row(casters, preview), observation)
-        write(block, lane, report_row(casters, preview), flat_report(report, torques))
+        state = read_state(block, lane, 0, sizes.casters)
+        torques = read_pairs(block, lane, torque_row(sizes), sizes.casters)
+        record = Record(*read(block, lane, record_row(sizes), _RECORD))
+        reference = Reference(*read(block, lane, reference_row(sizes), _REFERENCE))
+        points = each(_read_point, (block, lane, reference_row(sizes) + REFERENCE_ROWS), counting(sizes.preview))
+        situation = Situation(*read(block, lane, situation_row(sizes), _SITUATION))
+        nearest = each(_read_neighbour, (block, lane, nearest_row(sizes)), counting(sizes.nearest))
+        robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+        errors, ended, terms = judge(state, reference, torques, record, situation, robot, guide)
+        told = report(state, reference, errors, torques, record, situation, ended, terms, robot)
+        write(block, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, robot))
+        write(block, lane, report_row(sizes), flat_report(told, torques))
 
 
 @register_jitable(**INLINE)
-def _fetch(block: Any, lane: Any, robot: Any, world: World, casters: Any) -> None:
-    """Copy a robot's reference and previewed points from the table of all paths; the last row of a path stays."""
+def _fetch(block: Any, lane: Any, robot: Any, before: Any, world: World, sizes: Sizes) -> None:
+    """Fetch what the robot is to do, and what is near it; before: its progress so far, negative at a start."""
+    state = read_state(block, lane, 0, sizes.casters)
     clock, path = world.clocks[0, robot], world.clocks[1, robot]
-    row = reference_row(casters)
-    base, end = world.spans[path, 0], world.spans[path, 1]
-    now = min(base + clock, end)
-    for j in range(REFERENCE_ROWS):
-        block[(row + j) * LANES + lane] = world.samples[now, j]
-    row += REFERENCE_ROWS
-    for p in range(len(world.horizons)):
-        then = min(base + clock + world.horizons[p], end)
-        for j in range(POINT_ROWS):
-            block[(row + p * POINT_ROWS + j) * LANES + lane] = world.samples[then, j]
+    progress, share = guide_robot(block, lane, reference_row(sizes), state, clock, path, before, world.guide)
+    row = nearest_row(sizes)
+    for k in range(len(sizes.nearest)):
+        block[(row + NEIGHBOUR_ROWS * k) * LANES + lane] = GAP_LIMIT
+        block[(row + NEIGHBOUR_ROWS * k + 1) * LANES + lane] = 0.0
+        block[(row + NEIGHBOUR_ROWS * k + 2) * LANES + lane] = 0.0
+    gap = _look_around(block, lane, robot, state, world.obstacles, world, sizes)
+    write(block, lane, situation_row(sizes), (progress, share, gap))
 
 
 @register_jitable(**INLINE)
-def _deliver(block: Any, lane: Any, robot: Any, views: Views, casters: Any, preview: Any) -> None:
+def _insert(block: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: Sizes) -> None:
+    """Put an obstacle among the nearest ones, which stay in order."""
+    for k in range(len(sizes.nearest)):
+        at = (row + NEIGHBOUR_ROWS * k) * LANES + lane
+        if gap < block[at]:
+            gap, block[at] = block[at], gap
+            nx, block[at + LANES] = block[at + LANES], nx
+            ny, block[at + 2 * LANES] = block[at + 2 * LANES], ny
+
+
+@register_jitable(**INLINE)
+def _deliver(block: Any, lane: Any, robot: Any, views: Views, sizes: Sizes) -> None:
     """Copy a robot's observation and report to where Python reads them."""
-    row = observation_row(casters, preview)
+    row = observation_row(sizes)
     for j in range(views.observations.shape[1]):
         views.observations[robot, j] = block[(row + j) * LANES + lane]
-    row = report_row(casters, preview)
+    row = report_row(sizes)
     for j in range(views.reports.shape[0]):
         views.reports[j, robot] = block[(row + j) * LANES + lane]
     sin, cos = views.reports[HEADING_SIN, robot], views.reports[HEADING_COS, robot]
@@ -184,60 +367,64 @@ def _deliver(block: Any, lane: Any, robot: Any, views: Views, casters: Any, prev
 
 
 @register_jitable(**INLINE)
-def _step_lanes(
-    i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any
-) -> None:
+def _step_lanes(i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
     """One control period of the robots of block i, of which `look` observes as many as there are lanes."""
     block = world.blocks[i]
     first = i * LANES
     here = min(lanes, len(actions) - first)
-    row = command_row(casters)
+    row = command_row(sizes)
     for lane in range(here):
         for j in range(len(world.slots)):
             slot = world.slots[j]
             command = 0.0 if slot < 0 else float(actions[first + lane, slot])
             block[(row + j) * LANES + lane] = min(max(command, -1.0), 1.0)
-    _drive(block, lanes, world.substeps, world.time_step, casters, preview)
+    _drive(block, first, lanes, here, world, sizes)
     for lane in range(here):
         world.clocks[0, first + lane] += 1
-        _fetch(block, lane, first + lane, world, casters)
-    look(block, casters, preview)
+        _fetch(block, lane, first + lane, block[situation_row(sizes) * LANES + lane], world, sizes)
+    look(block, world.guide, sizes)
     for lane in range(here):
         robot = first + lane
-        _deliver(block, lane, robot, views, casters, preview)
+        _deliver(block, lane, robot, views, sizes)
         reward = 0.0
         for j in range(TERMS):
             reward += views.reports[FIRST_TERM + j, robot]
+        failed = 0.0
+        for j in range(ENDINGS):
+            failed += views.reports[j, robot]
         views.results[0, robot] = reward
-        views.results[1, robot] = views.reports[0, robot] + views.reports[1, robot]
-        views.results[2, robot] = 1.0 if world.clocks[0, robot] >= world.spans[world.clocks[1, robot], 2] else 0.0
+        views.results[1, robot] = failed
+        periods = world.guide.spans[world.clocks[1, robot], 2]
+        views.results[2, robot] = 1.0 if world.clocks[0, robot] >= periods else 0.0
 
 
 @register_jitable(**INLINE)
-def _look_at_all(block: Any, casters: Any, preview: Any) -> None:
-    _look(block, 0, LANES, casters, preview)
+def _look_at_all(block: Any, guide: Any, sizes: Sizes) -> None:
+    _look(block, 0, LANES, guide, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_first(block: Any, casters: Any, preview: Any) -> None:
-    look_at_one(block, 0, casters, preview)
+def _look_at_first(block: Any, guide: Any, sizes: Sizes) -> None:
+    look_at_one(block, 0, guide, sizes)
 
 
-def _look_at_one(block: Any, lane: Any, casters: Any, preview: Any) -> None:
-    _look(block, lane, 1, casters, preview)
+def _look_at_one(block: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
+    _look(block, lane, 1, guide, sizes)
 
 
-def _step_block(i: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    _step_lanes(i, LANES, _look_at_all, world, actions, views, casters, preview)
+def _step_block(i: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
+    world, views = _borrowed_world(world), _borrowed_views(views)
+    _step_lanes(i, LANES, _look_at_all, world, actions, views, sizes)
 
 
-def _step_single(world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
-    _step_lanes(0, 1, _look_at_first, world, actions, views, casters, preview)
+def _step_single(world: World, actions: Any, views: Views, sizes: Sizes) -> None:
+    world, views = _borrowed_world(world), _borrowed_views(views)
+    _step_lanes(0, 1, _look_at_first, world, actions, views, sizes)
 
 
-def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, casters: Any, preview: Any) -> None:
+def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
     for i in range(first, end):
-        step_block(i, world, actions, views, casters, preview)
+        step_block(i, world, actions, views, sizes)
 
 
 @register_jitable(**INLINE)
@@ -246,30 +433,35 @@ def _random_direction(key: Any, episode: Any, index: Any) -> Any:
     return math.cos(angle), math.sin(angle)
 
 
-def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views, casters: Any, preview: Any) -> None:
+def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views, sizes: Sizes) -> None:
     """Start new episodes of the selected robots; wanted: path of each, −1 draws one; spread: greatest offset, turn."""
+    world, views = _borrowed_world(world), _borrowed_views(views)
     for i in range(len(selected)):
         robot = selected[i]
         block, lane = world.blocks[robot // LANES], robot % LANES
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
-        drawn = int(uniform(key, episode, np.uint64(0)) * len(world.spans))
+        drawn = int(uniform(key, episode, np.uint64(0)) * len(world.guide.spans))
         world.clocks[1, robot] = drawn if wanted[i] < 0 else wanted[i]
         x = (2.0 * uniform(key, episode, np.uint64(1)) - 1.0) * spread[0]
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
         turn = (2.0 * uniform(key, episode, np.uint64(3)) - 1.0) * spread[1]
-        _fetch(block, lane, robot, world, casters)
-        reference = Reference(*read(block, lane, reference_row(casters), _REFERENCE))
-        directions = each(_random_direction, (key, episode), counting(casters))
+        directions = each(_random_direction, (key, episode), counting(sizes.casters))
+        nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions)
+        path = world.clocks[1, robot]
+        guide_robot(block, lane, reference_row(sizes), nowhere, 0, path, -1.0, world.guide)
+        reference = Reference(*read(block, lane, reference_row(sizes), _REFERENCE))
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
         write(block, lane, 0, pack_state(state))
-        for row in range(command_row(casters), reference_row(casters)):
+        for row in range(room_row(sizes), reference_row(sizes)):
             block[row * LANES + lane] = 0.0
-        look_at_one(block, lane, casters, preview)
-        _deliver(block, lane, robot, views, casters, preview)
+        _fetch(block, lane, robot, -1.0, world, sizes)
+        look_at_one(block, lane, world.guide, sizes)
+        _deliver(block, lane, robot, views, sizes)
 
 
+careful_step = compiled(_careful_step)
 look_at_one = compiled(_look_at_one)
 step_block = compiled(_step_block)
 step_single = compiled(_step_single)

@@ -1,4 +1,4 @@
-"""The task of following a timed trajectory, on generic scalars: errors, observation, reward terms and endings.
+"""Tracking a reference, on generic scalars: errors, observation, report, and the reward of a timed trajectory.
 
 Like the mechanics, this is written once: the single environment and the batch compile the same lines. Quantities with
 suffix _W are in the world frame, all others in the body frame B. Rational kernels 1 / (1 + e²/ℓ²) keep rewards bounded
@@ -22,7 +22,7 @@ from caster_gym.mechanics.scalars import (
     each,
     flatten,
     greatest,
-    maximum,
+    minimum,
     sqrt,
     total,
     where,
@@ -36,9 +36,12 @@ YAW_RATE_UNIT = 2.0  # [rad/s]
 YAW_RATE_ERROR_UNIT = 0.5  # [rad/s]
 ACCELERATION_UNIT = 2.0  # [m/s²]
 YAW_ACCELERATION_UNIT = 4.0  # [rad/s²]
+GAP_UNIT = 0.25  # [m] to an obstacle
+GAP_LIMIT = 1.0  # [m] obstacles farther away look as if they were there
 OBSERVATION_LIMIT = 20.0  # observed quantities are clipped here, far beyond what a robot in its corridor reaches
 
 Point: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+Neighbour: TypeAlias = tuple[Scalar, Scalar, Scalar]  # gap [m] and unit normal, towards the robot, in W
 
 
 class Reference(NamedTuple):
@@ -75,12 +78,15 @@ class Weights(NamedTuple):
     heading: Scalar
     speed: Scalar
     effort: Scalar
+    impact: Scalar
     position_scale: Scalar  # ℓ [m] the error at which half of the fine kernel is left
     heading_scale: Scalar  # [rad]
     speed_scale: Scalar  # [m/s]
     yaw_rate_scale: Scalar  # [rad/s]
+    impact_scale: Scalar  # [N s] normal impulse in a control period that costs half of the weight
     coarse: Scalar  # ratio of the wide kernel's length to the fine one's
     corridor: Scalar  # [m] position error that ends the episode
+    touching_ends: Scalar  # 1 if touching an obstacle ends the episode, else 0
 
 
 class Terms(NamedTuple):
@@ -90,7 +96,28 @@ class Terms(NamedTuple):
     heading: Scalar
     speed: Scalar
     effort: Scalar
+    impact: Scalar
     alive: Scalar
+
+
+class Record(NamedTuple):
+    """What happened during a control period."""
+
+    power: Scalar  # [W] mean of all motors
+    impulse_x: Scalar  # [N s] of obstacles on the robot, in W
+    impulse_y: Scalar
+    pressing: Scalar  # [N s] sum of all normal impulses
+    point_x: Scalar  # [m] of the last impact, in W
+    point_y: Scalar
+    impacts: Scalar  # how many
+
+
+class Situation(NamedTuple):
+    """Where the robot is on its way."""
+
+    progress: Scalar  # [m] arc length reached, where the task measures it
+    share: Scalar  # of the progress that the period allows, 0 … 1
+    clearance: Scalar  # [m] gap to the nearest obstacle
 
 
 def to_body(heading: Direction, x_W: Scalar, y_W: Scalar) -> tuple[Scalar, Scalar]:
@@ -120,27 +147,45 @@ def kernel(square: Scalar, scale: Scalar) -> Scalar:
     return 1.0 / (1.0 + square / (scale * scale))
 
 
-def reward_terms(errors: Errors, effort: Scalar, failed: Scalar, weights: Weights) -> Terms:
-    """Bounded tracking quality minus effort, never negative in sum, so that staying in the task beats leaving it.
+def both_kernels(square: Scalar, scale: Scalar, coarse: Scalar) -> Scalar:
+    """Mean of a fine kernel, for precision, and a coarse one, for a slope far away."""
+    return 0.5 * (kernel(square, scale) + kernel(square, coarse * scale))
 
-    Each quality is the mean of a fine kernel, for precision, and a coarse one, for a slope far away. The term `alive`
-    equals the greatest effort. effort is the mean square of the torques as shares of their limits, in 0 … 1.
+
+def turn_square(errors: Errors) -> Scalar:
+    """Squared chord of the heading error. [rad²]"""
+    return 2.0 * (1.0 - errors.cos)
+
+
+def distance_square(errors: Errors) -> Scalar:
+    """Squared distance to the reference. [m²]"""
+    return errors.ahead * errors.ahead + errors.left * errors.left
+
+
+def impact_share(pressing: Scalar, scale: Scalar) -> Scalar:
+    """How bad an impact was, 0 … 1: half at an impulse of `scale`."""
+    return pressing / (pressing + scale)
+
+
+def reward_terms(errors: Errors, effort: Scalar, record: Record, failed: Scalar, weights: Weights) -> Terms:
+    """Bounded tracking quality minus effort and impacts, never negative in sum: staying in the task beats leaving it.
+
+    The term `alive` equals the greatest cost. effort is the mean square of the torques as shares of their limits.
     """
-    distance = errors.ahead * errors.ahead + errors.left * errors.left
-    turn = 2.0 * (1.0 - errors.cos)  # squared chord of the heading error
     rate = (errors.vx * errors.vx + errors.vy * errors.vy) / (weights.speed_scale * weights.speed_scale)
     rate = rate + errors.omega * errors.omega / (weights.yaw_rate_scale * weights.yaw_rate_scale)
     wide = weights.coarse
     alive = where(failed > 0.5, 0.0, 1.0)
-    position = 0.5 * (kernel(distance, weights.position_scale) + kernel(distance, wide * weights.position_scale))
-    heading = 0.5 * (kernel(turn, weights.heading_scale) + kernel(turn, wide * weights.heading_scale))
+    position = both_kernels(distance_square(errors), weights.position_scale, wide)
+    heading = both_kernels(turn_square(errors), weights.heading_scale, wide)
     speed = 0.5 * (kernel(rate, 1.0) + kernel(rate, wide))
     return Terms(
         where(failed > 0.5, 0.0, weights.position * position),
         where(failed > 0.5, 0.0, weights.heading * heading),
         where(failed > 0.5, 0.0, weights.speed * speed),
         where(failed > 0.5, 0.0, -weights.effort * effort),
-        weights.effort * alive,
+        where(failed > 0.5, 0.0, -weights.impact * impact_share(record.pressing, weights.impact_scale)),
+        (weights.effort + weights.impact) * alive,
     )
 
 
@@ -155,10 +200,14 @@ def difference(number: Scalar) -> tuple[Scalar]:
     return (number - number,)
 
 
-def left_corridor(errors: Errors, weights: Weights) -> Scalar:
+def left_corridor(errors: Errors, corridor: Scalar) -> Scalar:
     """1 if the position error exceeds the corridor, else 0."""
-    distance = errors.ahead * errors.ahead + errors.left * errors.left
-    return where(distance > weights.corridor * weights.corridor, 1.0, 0.0)
+    return where(distance_square(errors) > corridor * corridor, 1.0, 0.0)
+
+
+def touched(record: Record, touching_ends: Scalar) -> Scalar:
+    """1 if the robot touched an obstacle although that ends the episode, else 0."""
+    return where(record.pressing * touching_ends > 0.0, 1.0, 0.0)
 
 
 def relative_effort(torque: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
@@ -201,8 +250,21 @@ def caster_rates(v: Vector, f: Direction, caster: CasterParameters) -> tuple[Sca
     return theta * caster.radius / SPEED_UNIT, delta * caster.trail / SPEED_UNIT
 
 
+def neighbour_seen(state: State, neighbour: Neighbour) -> Neighbour:
+    """An obstacle seen from the robot: its gap, and the direction from it to the robot; far away, no direction."""
+    gap, nx, ny = neighbour
+    nx, ny = to_body(state.heading, nx, ny)
+    near = gap < GAP_LIMIT
+    return minimum(gap, GAP_LIMIT) / GAP_UNIT, where(near, nx, 0.0 * nx), where(near, ny, 0.0 * ny)
+
+
 def observe(
-    state: State, reference: Reference, errors: Errors, preview: tuple[Point, ...], robot: RobotParameters
+    state: State,
+    reference: Reference,
+    errors: Errors,
+    preview: tuple[Point, ...],
+    nearest: tuple[Neighbour, ...],
+    robot: RobotParameters,
 ) -> tuple[Scalar, ...]:
     """The observation; `caster_gym.envs.observation` names its parts."""
     vx, vy, omega = state.twist
@@ -224,7 +286,7 @@ def observe(
     )
     casters = flatten(state.directions) + flatten(each(caster_rates, (state.twist,), state.directions, robot.casters))
     ahead = flatten(each(preview_point, (state,), preview))
-    return each(observed, (), numbers + casters + ahead)
+    return each(observed, (), numbers + casters + ahead + flatten(each(neighbour_seen, (state,), nearest)))
 
 
 def greatest_traction(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
@@ -240,63 +302,79 @@ def wheel_use(platform: PlatformParameters, force: tuple[Scalar, Scalar], load: 
     return traction_use(force, load, platform.floor_friction)
 
 
-class Report(NamedTuple):
-    """What a step tells beside observation and reward: fixed quantities first, then the motor torques."""
+class Endings(NamedTuple):
+    """Why an episode has failed; each 1 or 0."""
 
-    left_corridor: Scalar  # 1 or 0
-    not_finite: Scalar  # 1 or 0
+    left_corridor: Scalar
+    not_finite: Scalar
+    touched: Scalar
+
+
+def endings(state: State, errors: Errors, record: Record, corridor: Scalar, touching_ends: Scalar) -> Endings:
+    """Whether an episode ends here."""
+    return Endings(left_corridor(errors, corridor), not_finite(state), touched(record, touching_ends))
+
+
+class Report(NamedTuple):
+    """What a step tells beside observation and reward, and beside the motor torques, which follow it."""
+
+    endings: Endings
     position_error: Scalar  # [m]
     heading_sin: Scalar  # of the heading error
     heading_cos: Scalar
-    power: Scalar  # [W]
     traction_use: Scalar  # [-]
     conditioning: Scalar  # [-]
-    terms: Terms
+    terms: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
     pose: tuple[Scalar, Scalar, Scalar, Scalar]  # x, y, cos β, sin β in W
     reference_pose: tuple[Scalar, Scalar, Scalar, Scalar]
+    record: Record
+    situation: Situation
 
 
-def score(
+def report(
     state: State,
     reference: Reference,
     errors: Errors,
     torques: tuple[tuple[Scalar, Scalar], ...],
-    power: Scalar,
-    weights: Weights,
+    record: Record,
+    situation: Situation,
+    ended: Endings,
+    terms: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar],
     robot: RobotParameters,
 ) -> Report:
-    """Reward terms, endings and diagnostics of the present state after a step with the given mean motor torques."""
-    outside, broken = left_corridor(errors, weights), not_finite(state)
+    """Errors and diagnostics of the present state after a control period with the given mean motor torques."""
     return Report(
-        outside,
-        broken,
-        sqrt(errors.ahead * errors.ahead + errors.left * errors.left),
+        ended,
+        sqrt(distance_square(errors)),
         errors.sin,
         errors.cos,
-        power,
         greatest_traction(state, torques, robot),
         conditioning(state.directions, robot),
-        reward_terms(errors, mean_effort(torques, robot), maximum(outside, broken), weights),
+        terms,
         state.position + state.heading,
         (reference.x, reference.y, reference.cos, reference.sin),
+        record,
+        situation,
     )
 
 
-def flat_report(report: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> tuple[Scalar, ...]:
+def flat_report(told: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> tuple[Scalar, ...]:
     """The report and the motor torques as one row."""
-    fixed = (
-        report.left_corridor,
-        report.not_finite,
-        report.position_error,
-        report.heading_sin,
-        report.heading_cos,
-        report.power,
-        report.traction_use,
-        report.conditioning,
+    errors = (told.position_error, told.heading_sin, told.heading_cos, told.traction_use, told.conditioning)
+    poses = told.pose + told.reference_pose
+    ended, record, situation = told.endings, told.record, told.situation
+    happened = (
+        record.power,
+        record.impulse_x,
+        record.impulse_y,
+        record.pressing,
+        record.point_x,
+        record.point_y,
+        record.impacts,
     )
-    terms = report.terms
-    named = (terms.position, terms.heading, terms.speed, terms.effort, terms.alive)
-    return fixed + named + report.pose + report.reference_pose + flatten(torques)
+    where_it_is = (situation.progress, situation.share, situation.clearance)
+    flags = (ended.left_corridor, ended.not_finite, ended.touched)
+    return flags + errors + told.terms + poses + happened + where_it_is + flatten(torques)
 
 
 def start(

@@ -1,0 +1,75 @@
+"""One robot on a path as a Gymnasium environment, whatever its task."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.envs.drawing import Easel, checked_mode
+from caster_gym.envs.setup import action_space, observation_space
+from caster_gym.envs.task import Task
+from caster_gym.envs.task_engine import DRAW_A_PATH, TaskEngine
+
+Observation = NDArray[np.float32]
+_ONLY = np.zeros(1, dtype=np.int64)
+
+
+class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
+    """What the environments of single robots share; a subclass makes the engine of its task."""
+
+    # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
+
+    def __init__(self, engine: TaskEngine, task: Task, render_mode: str | None) -> None:
+        self.engine, self.task, self.robot = engine, task, engine.robot
+        self.observation_space = observation_space(engine)
+        self.action_space = action_space(engine)
+        self.render_mode = checked_mode(render_mode, self.metadata)
+        self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
+        self._easel = Easel(engine, self.render_mode, self.metadata["render_fps"])
+        self._started = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode; info as after a step. options["path"] chooses a path by its index in the pool."""
+        path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
+        super().reset(seed=seed)
+        if seed is not None or not self._started:
+            self.engine.seed(0, int(self.np_random.integers(2**63)))
+            self._started = True
+        outcome = self.engine.restart(_ONLY, path=path)
+        if self.render_mode == "human":
+            self.render()
+        return outcome.observations[0], self.engine.info_of_one(outcome.reports[:, 0])
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
+        actions = np.asarray(action, dtype=np.float32)
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"action must have shape {self.action_space.shape}, got {actions.shape}")
+        if np.isnan(actions).any():
+            raise ValueError(f"action must hold numbers, got {action}")
+        if not self._started:
+            raise RuntimeError("reset the environment before its first step")
+        outcome = self.engine.step(actions[None])
+        if self.render_mode == "human":
+            self.render()
+        return (
+            outcome.observations[0],
+            float(outcome.rewards[0]),
+            bool(outcome.terminated[0]),
+            bool(outcome.truncated[0]),
+            self.engine.info_of_one(outcome.reports[:, 0]),
+        )
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The present moment as an image (height, width, 3), or in a window, as `render_mode` says."""
+        if not self._started:
+            raise RuntimeError("reset the environment before it is drawn")
+        return self._easel.show([0])
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._easel.close()

@@ -1,0 +1,84 @@
+"""CasterFollow-v0: follow a path at the robot's own pace, among walls and pillars, with motor torques."""
+
+from typing import Any
+
+from gymnasium.vector import AutoresetMode
+
+from caster_gym.envs.caster_env import CasterEnv
+from caster_gym.envs.caster_vector_env import CasterVectorEnv, check_counts
+from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine
+
+
+class CasterFollowEnv(CasterEnv):
+    """An omnidirectional robot on powered casters follows a path as fast as it may, inside a corridor.
+
+    **Progress** is the arc length s of the point of the path nearest to the robot, sought from the progress so far to
+    0.2 m ahead: it never falls, a shortcut across a crossing earns nothing, nor does a loop backward.
+
+    **Reference** is that point, with the speed and acceleration that a time law has there: from rest to rest, the
+    fastest within the speed limit (1 m/s) and a margin (80 %) of the motors. Nobody has to keep to it.
+
+    **Action** as for `CasterTrackEnv`.
+
+    **Observation** as for `CasterTrackEnv`, from that reference, with a preview at arc lengths ahead (0.05, 0.15,
+    0.4 m) and the 3 nearest obstacles.
+
+    **Reward**, the sum of terms that `info["reward_terms"]` names; k(e, ℓ) = ½/(1 + e²/ℓ²) + ½/(1 + e²/(10 ℓ)²), and
+    σ is the progress in the control period as a share of what the speed limit allows, at most 1; at the end of the path
+    it is 1/(1 + e²/(0.02 m)²) of the distance e to its last point:
+
+    | term | meaning | range |
+    |---|---|---|
+    | progress | 0.2 σ | 0 … 0.2 |
+    | cross_track | 0.4 σ k(distance to the path, 0.01 m) | 0 … 0.4 |
+    | heading | 0.4 σ k(chord of the heading error, 0.15) | 0 … 0.4 |
+    | effort | −0.02 times the mean square of torques as shares of their limits | −0.02 … 0 |
+    | impact | −0.5 J/(J + 0.5 N s), J the normal impulse of obstacles in the period | −0.5 … 0 |
+    | alive | 0.52, so that no step is worth less than none | 0.52 |
+
+    **Info** as for `CasterTrackEnv`; progress [m] is s, progress_share is σ, position_error the distance to the path.
+
+    **Endings** `terminated`: the robot left its corridor (0.25 m from the path), its state stopped being finite, or it
+    touched an obstacle and `touching` is "ends"; all terms of that step are 0. `truncated`: 1.5 times what the time
+    law takes is over. Arriving does not end an episode.
+
+    **Start** at rest, with random steering, beside the path's start by up to 0.02 m along each axis and 0.1 rad.
+
+    robot, path, actuation, arena, render_mode: as for `CasterTrackEnv`; of a path only its geometry and headings count.
+    All other keywords are fields of `caster_gym.envs.follow_task.FollowTask`, which holds the numbers above.
+    """
+
+    def __init__(
+        self,
+        robot: RobotLike = "chung2008",
+        path: PathLike = "rounded_square",
+        actuation: Actuation = None,
+        arena: ArenaLike = None,
+        render_mode: str | None = None,
+        **task: Any,
+    ) -> None:
+        super().__init__(*follow_engine(robot, path, actuation, arena, task, 1), render_mode)
+
+
+class CasterFollowVectorEnv(CasterVectorEnv):
+    """A batch of `CasterFollowEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
+
+    max_episode_steps truncates episodes earlier. All other arguments are those of `CasterFollowEnv`; seeds, autoreset
+    modes and options are those of `CasterVectorEnv`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        robot: RobotLike = "chung2008",
+        path: PathLike = "rounded_square",
+        actuation: Actuation = None,
+        arena: ArenaLike = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        **task: Any,
+    ) -> None:
+        check_counts(num_envs, max_episode_steps)
+        made = follow_engine(robot, path, actuation, arena, task, num_envs, max_episode_steps)
+        super().__init__(*made, autoreset_mode, render_mode)

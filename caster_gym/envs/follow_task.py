@@ -1,0 +1,75 @@
+"""The parameters of the following task."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from caster_gym.configuration import parse
+from caster_gym.envs.following import FollowWeights
+from caster_gym.envs.task import Task
+
+
+class FollowTask(Task):
+    """How a path is to be followed at the robot's own pace, and what that is worth."""
+
+    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
+        0.05,
+        0.15,
+        0.4,
+    )  # [m] arc lengths ahead at which the path is shown
+    corridor: PositiveFloat = 0.25  # [m] distance from the path that ends an episode
+    start_offset: NonNegativeFloat = 0.02  # [m] greatest start offset along each axis
+    start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.1  # [rad] greatest start heading error
+    nearest: Annotated[int, Field(ge=0, le=16)] = 3  # obstacles that the observation shows
+    speed_limit: PositiveFloat = 1.0  # [m/s] along the path; faster progress is worth no more
+    margin: Annotated[float, Field(gt=0.0, le=1.0)] = 0.8  # share of the motors that the time law may use
+    free_heading: bool = False  # the robot may turn as it likes
+    window: PositiveFloat = 0.2  # [m] how far ahead of its progress the robot's nearest point is sought
+    allowance: Annotated[float, Field(ge=1.0, le=100.0)] = 1.5  # time allowed, as a multiple of the time law's
+    arrival: PositiveFloat = 0.01  # [m] from the end, where the path counts as done
+    arrival_scale: PositiveFloat = 0.02  # [m] distance from the end that halves what staying there is worth
+    progress_weight: NonNegativeFloat = 0.2
+    cross_track_weight: NonNegativeFloat = 0.4
+    heading_weight: NonNegativeFloat = 0.4
+    impact_weight: NonNegativeFloat = 0.5
+    cross_track_scale: PositiveFloat = 0.01  # [m]
+    heading_scale: PositiveFloat = 0.15  # [rad]
+
+    @model_validator(mode="after")
+    def _lengths_fit(self) -> Self:
+        if list(self.preview) != sorted(set(self.preview)):
+            raise ValueError(f"preview distances must rise from one to the next, got {list(self.preview)}")
+        if self.window < 2.0 * self.stride:
+            raise ValueError(
+                f"the window of {self.window:g} m must be at least twice the way of a control period at the speed "
+                f"limit, {self.stride:g} m"
+            )
+        self.check_start()
+        return self
+
+    @property
+    def stride(self) -> float:
+        """Way along the path in a control period at the speed limit. [m]"""
+        return self.speed_limit * self.control_period
+
+    def weights(self) -> FollowWeights:
+        """The reward's numbers."""
+        return FollowWeights(
+            self.progress_weight,
+            self.cross_track_weight,
+            self.heading_weight,
+            self.effort_weight,
+            self.impact_weight,
+            self.cross_track_scale,
+            self.heading_scale,
+            self.impact_scale,
+            self.coarse,
+            self.corridor,
+            float(self.touching == "ends"),
+        )
+
+
+def read_task(fields: Mapping[str, Any]) -> FollowTask:
+    """A checked task from keyword arguments."""
+    return parse(FollowTask, fields, "the following task")

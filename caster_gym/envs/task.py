@@ -1,0 +1,40 @@
+"""What all tasks have in common: time, corridor, starts, obstacles and costs."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from caster_gym.configuration import Frozen
+
+
+class Task(Frozen):
+    """How a path is to be walked, and what that costs."""
+
+    control_period: Annotated[float, Field(ge=1e-5, le=1.0)] = 0.02  # [s] between actions
+    substeps: Annotated[int, Field(gt=0, le=1000)] = 4  # RK4 steps in a control period
+    corridor: PositiveFloat = 0.5  # [m] position error that ends an episode
+    start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
+    start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
+    touching: Literal["allowed", "ends"] = "allowed"  # what touching an obstacle means for the episode
+    nearest: Annotated[int, Field(ge=0, le=16)] = 0  # obstacles that the observation shows
+    effort_weight: NonNegativeFloat = 0.02
+    impact_weight: NonNegativeFloat = 0.0
+    impact_scale: PositiveFloat = 0.5  # [N s] normal impulse in a control period that costs half of the weight
+    coarse: Annotated[float, Field(gt=1.0)] = 10.0  # length of the wide reward kernel over that of the fine one
+
+    @property
+    def time_step(self) -> float:
+        """Length of one RK4 step. [s]"""
+        return self.control_period / self.substeps
+
+    @property
+    def start_reach(self) -> float:
+        """Greatest distance of a start from the path. [m]"""
+        return float(self.start_offset * 2.0**0.5)
+
+    def check_start(self) -> None:
+        """Refuse starts outside the corridor."""
+        if self.start_reach >= self.corridor:
+            raise ValueError(
+                f"a start_offset of {self.start_offset:g} m along both axes leaves the corridor of {self.corridor:g} m"
+            )

@@ -1,0 +1,36 @@
+"""caster_gym.envs.observation: named parts fill the observation, and give physical quantities back."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from caster_gym.envs.observation import ObservationLayout
+from tests.random_robots import random_robot
+
+
+@pytest.mark.parametrize("caster_count", [2, 3, 4])
+@pytest.mark.parametrize("preview", [(), (0.1,), (0.1, 0.2, 0.4)])
+def test_parts_of_the_observation_fill_it_without_gap(caster_count, preview):
+    layout = ObservationLayout(random_robot(303, caster_count), preview)
+    ends = [0]
+    for part in layout.parts:
+        assert part.place.start == ends[-1]
+        assert len(part.scale) == part.place.stop - part.place.start
+        ends.append(part.place.stop)
+    assert ends[-1] == layout.size == 13 + 4 * caster_count + 7 * len(preview)
+    assert len(layout.table().splitlines()) == 2 + len(layout.parts)
+    assert all(part.name in layout.table() for part in layout.parts)
+
+
+def test_nearest_obstacles_come_last_in_the_observation():
+    robot = random_robot(303, 3)
+    without, layout = ObservationLayout(robot, (0.1,)), ObservationLayout(robot, (0.1,), "m", 2)
+    assert layout.size == without.size + 2 * 3
+    assert [part.name for part in layout.parts][-3:] == ["preview_0.1m", "obstacle_1", "obstacle_2"]
+    assert_array_equal(layout.physical(np.ones(layout.size), "obstacle_2"), [0.25, 1.0, 1.0])
+
+
+def test_a_batch_of_observations_is_decoded_along_its_last_axis():
+    layout = ObservationLayout(random_robot(304, 3), (0.1,))
+    batch = np.random.default_rng(5).normal(size=(2, 4, layout.size)).astype(np.float32)
+    assert_array_equal(layout.physical(batch, "twist")[1, 2], layout.physical(batch[1, 2], "twist"))
