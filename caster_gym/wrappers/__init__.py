@@ -1,0 +1,37 @@
+"""What an environment can do differently, for one robot and for a batch: rewards, actions, sensors and plants."""
+
+from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistCommands
+from caster_gym.wrappers.environment import FeatureEnv, FeatureVectorEnv, wrap
+from caster_gym.wrappers.feature import Feature
+from caster_gym.wrappers.latency import ActionDelay, MotorLag
+from caster_gym.wrappers.plants import Friction, Payload, WheelErrors
+from caster_gym.wrappers.pushes import Pushes
+from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
+from caster_gym.wrappers.sensors import SensorNoise, SteeringOffset
+from caster_gym.wrappers.specification import FeatureSpecification, read_features
+
+__all__ = [
+    "ActionDelay",
+    "Effort",
+    "Feature",
+    "FeatureEnv",
+    "FeatureSpecification",
+    "FeatureVectorEnv",
+    "Friction",
+    "Impact",
+    "JointSpeeds",
+    "MotorLag",
+    "Payload",
+    "Potential",
+    "Pushes",
+    "ResidualTorque",
+    "SensorNoise",
+    "Smoothness",
+    "SteeringOffset",
+    "Tolerance",
+    "TractionUse",
+    "TwistCommands",
+    "WheelErrors",
+    "read_features",
+    "wrap",
+]

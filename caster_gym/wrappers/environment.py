@@ -1,0 +1,211 @@
+"""Environments with features: one robot, or a batch, from the same features."""
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias, overload
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
+from numpy.typing import NDArray
+
+from caster_gym.wrappers.feature import Actions, Array, Feature, Flags, Observations
+from caster_gym.wrappers.plants import WheelErrors
+from caster_gym.wrappers.stack import Stack
+
+Env: TypeAlias = gym.Env[Any, Any]
+Batch: TypeAlias = VectorEnv[Any, Any, Any]
+
+_BETWEEN = (OrderEnforcing, PassiveEnvChecker, TimeLimit)  # wrappers that change no observation, reward or action
+_ONLY = np.zeros(1, dtype=np.int64)
+_RUNNING = np.zeros(1, dtype=np.bool_)
+
+
+class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """An environment of caster_gym with features; see `wrap`."""
+
+    def __init__(self, env: Env, features: Sequence[Feature] = ()) -> None:
+        RecordConstructorArgs.__init__(self, features=tuple(features))
+        gym.Wrapper.__init__(self, env)
+        self.features = _checked(features)
+        self._stack = Stack(_engine(env), _task(env), self.features, _space(env.action_space))
+        self.action_space = self._stack.action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        shown = self._stack.begin(_ONLY, observation[None], _batch_of_one(info))[0]
+        _tell(info, 0.0, dict.fromkeys(self._stack.terms, 0.0))
+        return shown, info
+
+    def step(self, action: Actions) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
+        """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
+        given = _checked_actions(action, self.action_space)
+        observation, task_reward, terminated, truncated, info = self.env.step(self._stack.act(given[None])[0])
+        terms = self._stack.score(_batch_of_one(info), {}, _RUNNING, np.array([terminated]))
+        numbers = {name: float(term[0]) for name, term in terms.items()}
+        reward = float(task_reward)
+        _tell(info, reward, numbers)
+        for number in numbers.values():
+            reward += number
+        return self._stack.observe(observation[None])[0], reward, terminated, truncated, info
+
+
+class FeatureVectorEnv(VectorWrapper[Any, Any, Any, Any, Any]):
+    """A batch of caster_gym with features, equal bit for bit to a SyncVectorEnv of `FeatureEnv`; see `wrap`."""
+
+    def __init__(self, env: Batch, features: Sequence[Feature] = ()) -> None:
+        super().__init__(env)
+        self.features = _checked(features)
+        self.autoreset_mode = AutoresetMode(env.metadata["autoreset_mode"])
+        self._stack = Stack(_engine(env), _task(env), self.features, _space(env.single_action_space))
+        self.single_action_space = self._stack.action_space
+        self.action_space = batch_space(self.single_action_space, env.num_envs)
+        self._ended: Flags = np.zeros(env.num_envs, dtype=np.bool_)
+        self._shown: Observations = np.zeros(self.observation_space.shape or (), dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start episodes of all robots, or of those in options["reset_mask"]."""
+        mask = np.array((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
+        observations, infos = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]  # a list will do
+        self._begin(mask, observations, infos)
+        self._ended = self._ended & ~mask
+        nothing = np.zeros(self.num_envs)
+        _tell(infos, nothing, {name: nothing.copy() for name in self._stack.terms}, mask)
+        return self._shown.copy(), infos
+
+    def step(self, actions: Actions) -> tuple[Observations, Array, Flags, Flags, dict[str, Any]]:
+        """Hold actions for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
+        given = _checked_actions(actions, self.action_space)
+        observations, task_rewards, terminated, truncated, infos = self.env.step(self._stack.act(given))
+        ended, self._ended = self._ended, terminated | truncated
+        at_once = self.autoreset_mode is AutoresetMode.SAME_STEP
+        fresh = self._ended if at_once else ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
+        terms = self._stack.score(infos, infos.get("final_info", {}), fresh, terminated)
+        self._shown = self._stack.observe(_last(observations, infos))
+        if not at_once:  # the step of fresh robots was their reset
+            terms = {name: np.where(fresh, 0.0, term) for name, term in terms.items()}
+        rewards = task_rewards.copy()
+        for term in terms.values():
+            rewards += term
+        if fresh.any():
+            if at_once:
+                self._tell_finals(infos, task_rewards, terms, fresh)
+            self._begin(fresh, observations, infos)
+        going_on = {name: np.where(fresh, 0.0, term) for name, term in terms.items()}
+        everyone = np.ones(self.num_envs, dtype=np.bool_)
+        _tell(infos, np.where(fresh, 0.0, task_rewards), going_on, everyone)
+        return self._shown.copy(), rewards, terminated, truncated, infos
+
+    def _begin(self, mask: Flags, observations: Observations, infos: dict[str, Any]) -> None:
+        """New episodes of some robots."""
+        robots = np.flatnonzero(mask)
+        self._shown[robots] = self._stack.begin(robots, observations[robots], infos)
+
+    def _tell_finals(self, infos: dict[str, Any], task_rewards: Array, terms: dict[str, Array], ended: Flags) -> None:
+        """Put what the last step of ended episodes showed and brought into final_obs and final_info."""
+        for robot in np.flatnonzero(ended):
+            infos["final_obs"][robot] = self._shown[robot].copy()
+        lasts = {name: np.where(ended, term, 0.0) for name, term in terms.items()}
+        _tell(infos["final_info"], np.where(ended, task_rewards, 0.0), lasts, ended)
+
+
+@overload
+def wrap(env: Env, *features: Feature) -> FeatureEnv: ...
+@overload
+def wrap(env: Batch, *features: Feature) -> FeatureVectorEnv: ...
+def wrap(env: Env | Batch, *features: Feature) -> FeatureEnv | FeatureVectorEnv:
+    """An environment of caster_gym, single or a batch, with features in the order of their list.
+
+    The first feature is nearest to the environment: observations pass it first, actions last. Rewards are the task's
+    plus the terms that features add, in their order; info["reward_terms"] holds them all by name and
+    info["task_reward"] what the task alone gave. Raises ValueError for environments and features that do not fit.
+    """
+    if isinstance(env, VectorEnv):
+        return FeatureVectorEnv(env, features)
+    if isinstance(env, gym.Env):
+        return FeatureEnv(env, features)
+    raise ValueError(f"only Gymnasium environments can have features, got {env!r}")
+
+
+def _engine(env: Env | Batch) -> Any:
+    """The engine behind an environment that nothing has changed. Raises ValueError if there is none."""
+    engine = getattr(env.unwrapped, "engine", None)
+    if not hasattr(engine, "on_restart"):
+        hint = ""
+        if hasattr(env.unwrapped, "envs"):
+            hint = "; wrap each environment inside instead, or make a native batch with gym.make_vec"
+        raise ValueError(f"features need an environment of caster_gym such as CasterTrack-v0, got {env}{hint}")
+    inside = env
+    while inside is not env.unwrapped:
+        if isinstance(inside, FeatureEnv | FeatureVectorEnv):
+            raise ValueError("this environment has been wrapped before: give all features to one call of wrap")
+        if not isinstance(inside, _BETWEEN):
+            raise ValueError(f"{type(inside).__name__} must stand outside of the features, not inside: {env}")
+        inside = inside.env
+    return engine
+
+
+def _task(env: Env | Batch) -> Any:
+    return getattr(env.unwrapped, "task", None)
+
+
+def _checked(features: Sequence[Feature]) -> tuple[Feature, ...]:
+    """The features, of which one at most gives actions another meaning."""
+    for feature in features:
+        if not isinstance(feature, Feature):
+            raise ValueError(f"a feature is one of caster_gym.wrappers, or read by read_features, got {feature!r}")
+    redefining = [type(feature).__name__ for feature in features if feature.redefines_actions]
+    if len(redefining) > 1:
+        raise ValueError(
+            f"only one feature can say what actions mean, got {' and '.join(redefining)}: each expects torques inside"
+        )
+    if sum(isinstance(feature, WheelErrors) for feature in features) > 1:
+        raise ValueError("wheel_errors may stand once among the features: the encoders know one described size")
+    return tuple(features)
+
+
+def _space(space: Any) -> "gym.spaces.Box[Any]":
+    if not isinstance(space, gym.spaces.Box):
+        raise ValueError(f"features need actions in a Box, got {space}")
+    return space
+
+
+def _checked_actions(actions: Any, space: Any) -> NDArray[np.float32]:
+    given = np.asarray(actions, dtype=np.float32)
+    if given.shape != space.shape:
+        raise ValueError(f"actions must have shape {space.shape}, got {given.shape}")
+    if np.isnan(given).any():
+        raise ValueError(
+            f"actions must hold numbers, got {given[np.isnan(given).any(axis=-1)] if given.ndim > 1 else given}"
+        )
+    return given
+
+
+def _last(observations: Observations, infos: dict[str, Any]) -> Observations:
+    """What the environment showed at the end of the step, before any reset."""
+    if "final_obs" not in infos:
+        return observations
+    last, ended = observations.copy(), infos["_final_obs"]
+    last[ended] = np.stack(list(infos["final_obs"][ended]))
+    return last
+
+
+def _batch_of_one(info: dict[str, Any]) -> dict[str, Any]:
+    """Info of one robot as that of a batch; reward terms as they are."""
+    return {key: value if isinstance(value, dict) else np.asarray(value)[None] for key, value in info.items()}
+
+
+def _tell(infos: dict[str, Any], task_reward: Any, terms: dict[str, Any], mask: Flags | None = None) -> None:
+    """Put the task's reward and the added terms into infos, with masks if they are those of a batch."""
+    infos["task_reward"] = task_reward
+    infos["reward_terms"].update(terms)
+    if mask is not None:
+        infos["_task_reward"] = mask.copy()
+        infos["reward_terms"].update({f"_{name}": mask.copy() for name in terms})

@@ -1,0 +1,140 @@
+"""What a feature is: a description that is checked once, and the part that works for a number of robots.
+
+Arrays have one row per robot. `robots` picks some of them: an array of indices, or slice(None) for all.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+from pydantic import AfterValidator
+
+from caster_gym.configuration import Frozen
+
+if TYPE_CHECKING:
+    from caster_gym.envs.observation import Part
+    from caster_gym.envs.task import Task
+    from caster_gym.envs.task_engine import TaskEngine
+
+Array: TypeAlias = NDArray[np.float64]
+Actions: TypeAlias = NDArray[np.float32]
+Observations: TypeAlias = NDArray[np.float32]
+Flags: TypeAlias = NDArray[np.bool_]
+Seeds: TypeAlias = NDArray[np.uint64]
+Robots: TypeAlias = NDArray[np.int64] | slice
+Quantities: TypeAlias = Callable[[str], Array]  # a quantity (robots, …) of the environment's info, by its name
+
+
+def _rising(value: float | tuple[float, float]) -> float | tuple[float, float]:
+    low, high = limits(value)
+    if low > high:
+        raise ValueError("must rise from its first to its second number")
+    return value
+
+
+def _not_negative(value: float | tuple[float, float]) -> float | tuple[float, float]:
+    if limits(value)[0] < 0.0:
+        raise ValueError("must not be negative")
+    return value
+
+
+Range: TypeAlias = Annotated[float | tuple[float, float], AfterValidator(_rising)]
+"""A number, or two between which each episode draws one uniformly."""
+
+Size: TypeAlias = Annotated[Range, AfterValidator(_not_negative)]
+"""A range of numbers that are not negative."""
+
+
+def limits(value: float | tuple[float, float]) -> tuple[float, float]:
+    """Least and greatest number of a range."""
+    return value if isinstance(value, tuple) else (value, value)
+
+
+def between(value: float | tuple[float, float], shares: Array) -> Array:
+    """The numbers at shares 0 … 1 of a range."""
+    low, high = limits(value)
+    return low + (high - low) * shares
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a feature works."""
+
+    engine: "TaskEngine"
+    task: "Task"
+    width: int  # of the actions that the feature inside understands
+    seeds: Seeds  # (robots,) of the feature's random numbers in the present episodes; the stack keeps them up to date
+    clocks: NDArray[np.int64]  # (robots,) control periods done in them, likewise
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        return self.engine.count
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+        return self.task.control_period
+
+    def part(self, name: str) -> "Part":
+        """A part of the observation."""
+        return next(part for part in self.engine.layout.parts if part.name == name)
+
+
+class Runtime:
+    """A feature at work; each kind overrides what it changes. Its memory starts anew with every episode of a robot."""
+
+    action_space: "Box[Any] | None" = None
+    """Space of one robot's action, if it means something else than inside."""
+
+    def begin(self, robots: NDArray[np.int64], quantities: Quantities) -> None:
+        """New episodes of some robots have begun; quantities are those after their reset."""
+
+    def act(self, actions: Actions) -> Actions:
+        """Actions for the inside from those of the outside."""
+        return actions
+
+    def observe(self, observations: Observations, robots: Robots) -> Observations:
+        """Observations for the outside from those of the inside, of some robots. The given array stays as it is."""
+        return observations
+
+
+class RewardRuntime(Runtime):
+    """A feature that adds a term to the reward."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        """The term (robots,) of a step."""
+        raise NotImplementedError
+
+
+class PlantRuntime(Runtime):
+    """A feature that changes the plant, which no agent is told."""
+
+    def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
+        """Mechanics parameters (k, fields) of robots whose episodes with these seeds (k,) are about to start."""
+        raise NotImplementedError
+
+
+class PushingRuntime(Runtime):
+    """A feature that pushes the robots from outside."""
+
+    def wrenches(self) -> Array:
+        """Wrenches at C in B (robots, 3) during the coming control period. [N, N, N m]"""
+        raise NotImplementedError
+
+
+class Feature(Frozen):
+    """Something that an environment does differently, told in numbers with units."""
+
+    redefines_actions: ClassVar[bool] = False
+    """Whether actions mean something else outside; only one feature of an environment may do that."""
+
+    def runtime(self, place: Place) -> Runtime:
+        """The feature at work. Raises ValueError for a place where it cannot be."""
+        raise NotImplementedError

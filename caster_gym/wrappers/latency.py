@@ -1,0 +1,80 @@
+"""What stands between a command and a torque: waiting, and motors that follow slowly."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from caster_gym.wrappers.draws import uniforms
+from caster_gym.wrappers.feature import Actions, Array, Feature, Place, Quantities, Runtime, Size, between
+
+FIRST = np.zeros(1, dtype=np.int64)
+Periods = Annotated[int, Field(ge=0, le=1000)]
+
+
+def _rising(value: int | tuple[int, int]) -> int | tuple[int, int]:
+    if isinstance(value, tuple) and value[0] > value[1]:
+        raise ValueError("must rise from its first to its second number")
+    return value
+
+
+class ActionDelay(Feature):
+    """Actions arrive late, by whole control periods; until the first one arrives, they are zero."""
+
+    kind: Literal["action_delay"] = "action_delay"
+    periods: Annotated[Periods | tuple[Periods, Periods], AfterValidator(_rising)] = 1  # [control periods] by episode
+
+    def runtime(self, place: Place) -> Runtime:
+        """Waiting actions of every robot."""
+        return _Delay(self, place)
+
+
+class MotorLag(Feature):
+    """Actions are followed as by a first-order lag: what remains to be done falls as exp(−t / time constant)."""
+
+    kind: Literal["motor_lag"] = "motor_lag"
+    time_constant: Size = 0.02  # [s] by episode
+
+    def runtime(self, place: Place) -> Runtime:
+        """Followed actions of every robot."""
+        return _Lag(self, place)
+
+
+class _Delay(Runtime):
+    def __init__(self, feature: ActionDelay, place: Place) -> None:
+        low, high = feature.periods if isinstance(feature.periods, tuple) else (feature.periods, feature.periods)
+        self._least, self._choices = low, high - low + 1
+        self._place = place
+        self._periods = np.full(place.count, low)
+        self._waiting = np.zeros((high + 1, place.count, place.width), dtype=np.float32)
+        self._everyone = np.arange(place.count)
+        self._next = 0
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        self._waiting[:, robots] = 0.0
+        shares = uniforms(self._place.seeds[robots], FIRST)[:, 0]
+        self._periods[robots] = self._least + (self._choices * shares).astype(np.int64)
+
+    def act(self, actions: Actions) -> Actions:
+        self._waiting[self._next] = actions
+        due: Actions = self._waiting[(self._next - self._periods) % len(self._waiting), self._everyone]
+        self._next = (self._next + 1) % len(self._waiting)
+        return due
+
+
+class _Lag(Runtime):
+    def __init__(self, feature: MotorLag, place: Place) -> None:
+        self._range = feature.time_constant
+        self._place = place
+        self._share = np.ones((place.count, 1))  # of what remains, done in a control period
+        self._followed = np.zeros((place.count, place.width))
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        self._followed[robots] = 0.0
+        constants: Array = between(self._range, uniforms(self._place.seeds[robots], FIRST))
+        with np.errstate(divide="ignore"):
+            self._share[robots] = 1.0 - np.exp(-self._place.period / constants)
+
+    def act(self, actions: Actions) -> Actions:
+        self._followed += self._share * (actions - self._followed)
+        return self._followed.astype(np.float32)

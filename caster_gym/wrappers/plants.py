@@ -1,0 +1,180 @@
+"""Robots that are not as their description says: loads, friction, wheels. Every episode draws anew, from the nominal.
+
+Only the plant changes; agents know the nominal robot. Parameters are rows (k, fields) in the order of
+`caster_gym.mechanics.parameters.pack_parameters`.
+"""
+
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, model_validator
+
+from caster_gym.mechanics.parameters import CASTER_FIELDS, PLATFORM_FIELDS, CasterParameters, PlatformParameters
+from caster_gym.wrappers.draws import uniforms
+from caster_gym.wrappers.feature import (
+    Array,
+    Feature,
+    Observations,
+    Place,
+    PlantRuntime,
+    Quantities,
+    Range,
+    Robots,
+    Runtime,
+    Seeds,
+    Size,
+    between,
+    limits,
+)
+
+
+class Payload(Feature):
+    """A load that is fixed to the platform."""
+
+    kind: Literal["payload"] = "payload"
+    mass: Size = 1.0  # [kg]
+    x: Range = 0.0  # [m] its mass centre, forward of C
+    y: Range = 0.0  # [m] and left of C
+    inertia: NonNegativeFloat = 0.0  # [kg m²] about a vertical axis through its mass centre; 0: a point
+
+    def runtime(self, place: Place) -> Runtime:
+        """Platforms with loads."""
+        return _Payload(self)
+
+
+class Friction(Feature):
+    """Other friction in each joint, drawn joint by joint, and another floor."""
+
+    kind: Literal["friction"] = "friction"
+    viscous_scale: Size = 1.0  # [-] of the joints' own viscous friction
+    coulomb_scale: Size = 1.0  # [-] of the joints' own dry friction
+    added_viscous: Size = 0.0  # [N m s/rad] on top, in every joint
+    added_coulomb: Size = 0.0  # [N m] on top, in every joint
+    floor_friction: Size | None = None  # [-] between wheels and floor; null: the robot's own
+
+    @model_validator(mode="after")
+    def _floor_holds(self) -> Self:
+        if self.floor_friction is not None and limits(self.floor_friction)[0] <= 0.0:
+            raise ValueError(f"floor_friction must be positive, got {self.floor_friction}")
+        return self
+
+    def runtime(self, place: Place) -> Runtime:
+        """Joints and floors with other friction."""
+        return _Friction(self, place)
+
+
+class WheelErrors(Feature):
+    """Casters whose trails and wheels differ from the description, drawn caster by caster."""
+
+    kind: Literal["wheel_errors"] = "wheel_errors"
+    trail: Range = 0.0  # [m] true trail minus described one
+    radius: Range = 0.0  # [m] true radius minus described one
+
+    def runtime(self, place: Place) -> Runtime:
+        """Casters of other sizes. Raises ValueError for ones that time steps cannot follow."""
+        robot, task = place.engine.robot, place.task
+        trail = min(caster.trail for caster in robot.casters) + limits(self.trail)[0]
+        radius = min(caster.radius for caster in robot.casters) + limits(self.radius)[0]
+        if trail <= 0.0 or radius <= 0.0:
+            raise ValueError(
+                f"wheel_errors must leave trails and radii of robot {robot.name!r} positive, "
+                f"got a trail of {trail:g} m and a radius of {radius:g} m"
+            )
+        speed = max((caster.radius + limits(self.radius)[1]) * caster.roll.max_speed for caster in robot.casters)
+        if task.time_step > (longest := trail / speed) * (1.0 + 1e-9):
+            raise ValueError(
+                f"wheel_errors make a trail of {trail:g} m at a top speed of {speed:g} m/s, which needs a time step of "
+                f"at most {longest:.3g} s, got {task.time_step:g} s: use more substeps or smaller errors"
+            )
+        return _WheelErrors(self, place)
+
+
+class _Payload(PlantRuntime):
+    def __init__(self, feature: Payload) -> None:
+        self._feature = feature
+
+    def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
+        feature = self._feature
+        shares = uniforms(seeds, np.arange(3))
+        added = between(feature.mass, shares[:, 0])
+        x, y = between(feature.x, shares[:, 1]), between(feature.y, shares[:, 2])
+        mass, inertia, com_x, com_y = (parameters[:, _platform(name)] for name in ("mass", "inertia", "com_x", "com_y"))
+        together = mass + added
+        away = (x - com_x) ** 2 + (y - com_y) ** 2  # parallel axes: two masses about their common centre
+        rebuilt = parameters.copy()
+        rebuilt[:, _platform("mass")] = together
+        rebuilt[:, _platform("inertia")] = inertia + feature.inertia + mass * added / together * away
+        rebuilt[:, _platform("com_x")] = (mass * com_x + added * x) / together
+        rebuilt[:, _platform("com_y")] = (mass * com_y + added * y) / together
+        return rebuilt
+
+
+class _Friction(PlantRuntime):
+    def __init__(self, feature: Friction, place: Place) -> None:
+        casters = place.engine.robot.caster_count
+        self._floor = feature.floor_friction
+        self._kinds = (
+            (_joints(casters, "viscous"), feature.viscous_scale, feature.added_viscous),
+            (_joints(casters, "coulomb"), feature.coulomb_scale, feature.added_coulomb),
+        )
+
+    def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
+        rebuilt = parameters.copy()
+        first = 1
+        for columns, scale, added in self._kinds:
+            shares = uniforms(seeds, first + np.arange(2 * len(columns)))
+            factors, terms = between(scale, shares[:, : len(columns)]), between(added, shares[:, len(columns) :])
+            rebuilt[:, columns] = factors * parameters[:, columns] + terms
+            first += 2 * len(columns)
+        if self._floor is not None:
+            rebuilt[:, _platform("floor_friction")] = between(self._floor, uniforms(seeds, np.zeros(1, np.int64))[:, 0])
+        return rebuilt
+
+
+class _WheelErrors(PlantRuntime):
+    """Encoders show joint rates, whatever the wheels' sizes: observations scale these with the described sizes."""
+
+    def __init__(self, feature: WheelErrors, place: Place) -> None:
+        robot = place.engine.robot
+        self._feature, self._place = feature, place
+        radii, trails = (_casters(robot.caster_count, name) for name in ("radius", "trail"))
+        self._columns = [column for pair in zip(radii, trails, strict=True) for column in pair]
+        self._described = np.array([size for caster in robot.casters for size in (caster.radius, caster.trail)])
+        self._rates = place.part("joint_rates").place
+        self._ratios = np.ones((place.count, len(self._described)))
+
+    def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
+        rebuilt = parameters.copy()
+        rebuilt[:, self._columns] += self._errors(seeds)
+        return rebuilt
+
+    def begin(self, robots: NDArray[np.int64], quantities: Quantities) -> None:
+        self._ratios[robots] = self._described / (self._described + self._errors(self._place.seeds[robots]))
+
+    def observe(self, observations: Observations, robots: Robots) -> Observations:
+        shown = observations.copy()
+        shown[:, self._rates] = shown[:, self._rates] * self._ratios[robots]
+        return shown
+
+    def _errors(self, seeds: Seeds) -> Array:
+        """Errors (k, 2 N) of each caster's radius and trail. [m]"""
+        shares = uniforms(seeds, np.arange(len(self._described)))
+        errors = np.empty_like(shares)
+        errors[:, ::2] = between(self._feature.radius, shares[:, ::2])
+        errors[:, 1::2] = between(self._feature.trail, shares[:, 1::2])
+        return errors
+
+
+def _platform(name: str) -> int:
+    return PlatformParameters._fields.index(name)
+
+
+def _casters(count: int, name: str) -> list[int]:
+    """Columns of a parameter of every caster."""
+    return [PLATFORM_FIELDS + i * CASTER_FIELDS + CasterParameters._fields.index(name) for i in range(count)]
+
+
+def _joints(casters: int, name: str) -> list[int]:
+    """Columns of a parameter of every rolling and steering joint."""
+    return sorted(_casters(casters, f"roll_{name}") + _casters(casters, f"steer_{name}"))

@@ -1,0 +1,262 @@
+"""Terms that are added to a task's reward, each by its name. None of them is ever anything but a finite number."""
+
+import math
+from typing import Annotated, Literal, Self, TypeAlias
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from caster_gym.configuration import ConfigurationError
+from caster_gym.wrappers.feature import Array, Feature, Flags, Place, Quantities, RewardRuntime, Runtime
+
+Shape: TypeAlias = Literal["gaussian", "long_tail", "linear", "quadratic"]
+
+OF_THE_STATE = (
+    "clearance",
+    "conditioning",
+    "heading_error",
+    "position_error",
+    "progress",
+    "progress_share",
+)
+"""Quantities that say where the robot is, not what was done: a potential may depend on these."""
+
+
+class Worth(Feature):
+    """How good a value of a quantity is: 1 within bounds, falling outside to value_at_margin at a margin from them."""
+
+    quantity: str  # name of a number in info
+    bounds: tuple[float | None, float | None] = (0.0, 0.0)  # [unit of the quantity] null: no bound
+    margin: NonNegativeFloat = 0.0  # [unit of the quantity] 0: worth nothing outside
+    value_at_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+    shape: Shape = "gaussian"
+    weight: float = 1.0  # reward for a worth of 1
+    name: str | None = None  # of the term; by default that of the kind and the quantity
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        low, high = self.bounds
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"bounds must rise from the first to the second, got {list(self.bounds)}")
+        if self.value_at_margin == 0.0 and self.shape in ("gaussian", "long_tail"):
+            raise ValueError(f"a {self.shape} shape never reaches a value_at_margin of 0; 'linear' and 'quadratic' do")
+        return self
+
+    def worth(self, values: Array) -> Array:
+        """1 within bounds, less outside, never below 0; 0 for what is not a number."""
+        low, high = (-np.inf if self.bounds[0] is None else self.bounds[0]), self.bounds[1]
+        outside = np.maximum(np.maximum(low - values, 0.0), 0.0 if high is None else values - high)
+        if self.margin == 0.0:
+            return np.where(outside == 0.0, 1.0, 0.0)
+        worth = falling(outside / self.margin, self.value_at_margin, self.shape)
+        return np.where(np.isnan(values), 0.0, worth)
+
+
+class Potential(Worth):
+    """Shaping by a potential Φ = weight · worth of a quantity of the state: γ Φ(s′) − Φ(s), with Φ = 0 after failure.
+
+    It leaves every optimal policy optimal if the discount γ is the learner's (Ng, Harada and Russell, ICML 1999). An
+    episode that is cut off by time keeps the potential of its last state.
+    """
+
+    kind: Literal["potential"] = "potential"
+    discount: Annotated[float, Field(gt=0.0, le=1.0)]  # γ, per control period: that of the learner
+    margin: PositiveFloat  # [unit of the quantity]
+    value_at_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    shape: Shape = "linear"
+
+    @model_validator(mode="after")
+    def _depends_on_the_state(self) -> Self:
+        if self.quantity not in OF_THE_STATE:
+            raise ValueError(
+                f"a potential must depend on the state alone, on one of {', '.join(OF_THE_STATE)}, "
+                f"got {self.quantity!r}"
+            )
+        return self
+
+    def runtime(self, place: Place) -> Runtime:
+        """The potential of every robot."""
+        return _Potential(self, place)
+
+
+class Tolerance(Worth):
+    """weight · worth of a quantity after the step."""
+
+    kind: Literal["tolerance"] = "tolerance"
+
+    def runtime(self, place: Place) -> Runtime:
+        """The term."""
+        return _Tolerance(self)
+
+
+class Effort(Feature):
+    """−weight · mean square of the motors' torques as shares of their greatest."""
+
+    kind: Literal["effort"] = "effort"
+    weight: NonNegativeFloat = 0.02
+    name: str = "extra_effort"
+
+    def runtime(self, place: Place) -> Runtime:
+        """The term."""
+        return _Effort(self.name, self.weight, place)
+
+
+class Smoothness(Feature):
+    """−weight · mean square of the change of the motors' torque shares since the step before; they start at zero."""
+
+    kind: Literal["smoothness"] = "smoothness"
+    weight: NonNegativeFloat = 0.05
+    name: str = "smoothness"
+
+    def runtime(self, place: Place) -> Runtime:
+        """The last torques of every robot."""
+        return _Smoothness(self.name, self.weight, place)
+
+
+class TractionUse(Feature):
+    """−weight · (use of the floor's friction − threshold), none below the threshold, and never more than weight."""
+
+    kind: Literal["traction_use"] = "traction_use"
+    weight: NonNegativeFloat = 0.1
+    threshold: NonNegativeFloat = 0.8  # [-] 1: the wheel that uses most is about to slip
+    name: str = "traction"
+
+    def runtime(self, place: Place) -> Runtime:
+        """The term."""
+        return _Traction(self)
+
+
+class Impact(Feature):
+    """−weight · normal impulse of obstacles on the robot during the step."""
+
+    kind: Literal["impact"] = "impact"
+    weight: NonNegativeFloat = 1.0  # [1/(N s)]
+    name: str = "extra_impact"
+
+    def runtime(self, place: Place) -> Runtime:
+        """The term."""
+        return _Impact(self)
+
+
+def falling(distance: Array, value_at_one: float, shape: Shape) -> Array:
+    """A function of a distance >= 0 that is 1 at 0 and the given value at 1."""
+    square: Array = np.square(distance)
+    if shape == "gaussian":
+        return np.exp(square * math.log(value_at_one))
+    if shape == "long_tail":
+        return 1.0 / (1.0 + square * (1.0 / value_at_one - 1.0))
+    reach = distance if shape == "linear" else square
+    return np.maximum(1.0 - reach * (1.0 - value_at_one), 0.0)
+
+
+def shaping(before: Array, after: Array, discount: float, terminated: Flags) -> Array:
+    """γ Φ(s′) − Φ(s), where a state after failure has no potential."""
+    return discount * np.where(terminated, 0.0, after) - before
+
+
+def finite(values: Array) -> Array:
+    """The values, with 0 for what is infinite or not a number."""
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+def number(quantities: Quantities, name: str) -> Array:
+    """A quantity with one number a robot."""
+    values = quantities(name)
+    if values.ndim != 1:
+        raise ConfigurationError(f"a reward term needs a quantity of one number, {name!r} has {values.shape[1]}")
+    return values
+
+
+class _Potential(RewardRuntime):
+    def __init__(self, feature: Potential, place: Place) -> None:
+        super().__init__(feature.name or f"potential_{feature.quantity}")
+        self._feature = feature
+        self._now = np.zeros(place.count)
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        self._now[robots] = self._potential(quantities)[robots]
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        before, self._now = self._now, self._potential(quantities)
+        return shaping(before, self._now, self._feature.discount, terminated)
+
+    def _potential(self, quantities: Quantities) -> Array:
+        return self._feature.weight * self._feature.worth(number(quantities, self._feature.quantity))
+
+
+class _Tolerance(RewardRuntime):
+    def __init__(self, feature: Tolerance) -> None:
+        super().__init__(feature.name or f"tolerance_{feature.quantity}")
+        self._feature = feature
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        number(quantities, self._feature.quantity)  # so that an unknown one is refused at once
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        return self._feature.weight * self._feature.worth(number(quantities, self._feature.quantity))
+
+
+class _OfTorques(RewardRuntime):
+    """A term that depends on the torques of the driven motors."""
+
+    def __init__(self, name: str, weight: float, place: Place) -> None:
+        super().__init__(name)
+        robot = place.engine.robot
+        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
+        self._weight = weight
+        self._driven = [robot.joints.index(joint) for joint in robot.driven]
+        self._limits = np.array([motors[i].max_torque for i in self._driven])
+
+    def _shares(self, quantities: Quantities) -> Array:
+        shares: Array = quantities("torque")[:, self._driven] / self._limits
+        return shares
+
+
+class _Effort(_OfTorques):
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        return -self._weight * finite(_mean_square(self._shares(quantities)))
+
+
+class _Smoothness(_OfTorques):
+    def __init__(self, name: str, weight: float, place: Place) -> None:
+        super().__init__(name, weight, place)
+        self._last = np.zeros((place.count, len(self._driven)))
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        self._last[robots] = 0.0
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        before, self._last = self._last, self._shares(quantities)
+        return -self._weight * finite(_mean_square(self._last - before))
+
+
+class _Traction(RewardRuntime):
+    def __init__(self, feature: TractionUse) -> None:
+        super().__init__(feature.name)
+        self._feature = feature
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        excess = np.clip(quantities("traction_use") - self._feature.threshold, 0.0, 1.0)
+        return -self._feature.weight * finite(excess)
+
+
+class _Impact(RewardRuntime):
+    def __init__(self, feature: Impact) -> None:
+        super().__init__(feature.name)
+        self._feature = feature
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        quantities("normal_impulse")
+
+    def term(self, quantities: Quantities, terminated: Flags) -> Array:
+        return -self._feature.weight * finite(quantities("normal_impulse"))
+
+
+def _mean_square(shares: Array) -> Array:
+    """Mean over motors (robots,), summed in their order however many robots there are."""
+    squares: Array = np.square(shares)
+    total = squares[:, 0].copy()
+    for motor in range(1, squares.shape[1]):
+        total += squares[:, motor]
+    mean: Array = total / squares.shape[1]
+    return mean

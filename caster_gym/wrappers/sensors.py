@@ -1,0 +1,148 @@
+"""What sensors say: noise, bias and encoders that are mounted askew.
+
+Noise enters where a robot measures, in its pose, twist, steering angles and joint rates, and all parts of an
+observation that are computed from a measurement follow it: a heading that is wrong by ε turns everything that is seen
+of the reference by −ε, and an error of the twist shows in the twist and, the other way round, in its error. Parts that
+are measured from the robot itself, such as obstacles, stay as they are.
+"""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import NonNegativeFloat
+
+from caster_gym.envs.tracking import OBSERVATION_LIMIT
+from caster_gym.wrappers.draws import normals, uniforms
+from caster_gym.wrappers.feature import (
+    Array,
+    Feature,
+    Observations,
+    Place,
+    Quantities,
+    Range,
+    Robots,
+    Runtime,
+    between,
+)
+
+
+class SensorNoise(Feature):
+    """Normal noise of every control period, and biases that stay for an episode; numbers are standard deviations."""
+
+    kind: Literal["sensor_noise"] = "sensor_noise"
+    position: NonNegativeFloat = 0.0  # [m] of the measured place, along each axis
+    heading: NonNegativeFloat = 0.0  # [rad] of the measured heading
+    speed: NonNegativeFloat = 0.0  # [m/s] of the measured vx and vy
+    yaw_rate: NonNegativeFloat = 0.0  # [rad/s]
+    steering: NonNegativeFloat = 0.0  # [rad] of every steering angle
+    joint_rate: NonNegativeFloat = 0.0  # [rad/s] of every rolling and steering rate
+    position_bias: NonNegativeFloat = 0.0  # [m]
+    heading_bias: NonNegativeFloat = 0.0  # [rad]
+    speed_bias: NonNegativeFloat = 0.0  # [m/s]
+    yaw_rate_bias: NonNegativeFloat = 0.0  # [rad/s]
+
+    def runtime(self, place: Place) -> Runtime:
+        """Sensors of every robot."""
+        return _SensorNoise(self, place)
+
+
+class SteeringOffset(Feature):
+    """Steering encoders that show every angle turned by a constant, drawn caster by caster."""
+
+    kind: Literal["steering_offset"] = "steering_offset"
+    angle: Range = (-0.02, 0.02)  # [rad] shown minus true angle
+
+    def runtime(self, place: Place) -> Runtime:
+        """Encoders of every robot."""
+        return _SteeringOffset(self, place)
+
+
+class _SteeringOffset(Runtime):
+    def __init__(self, feature: SteeringOffset, place: Place) -> None:
+        self._range, self._place = feature.angle, place
+        self._directions = place.part("directions").place
+        casters = place.engine.robot.caster_count
+        self._casters = np.arange(casters)
+        self._cos, self._sin = np.ones((place.count, casters)), np.zeros((place.count, casters))
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        angles = between(self._range, uniforms(self._place.seeds[robots], self._casters))
+        self._cos[robots], self._sin[robots] = np.cos(angles), np.sin(angles)
+
+    def observe(self, observations: Observations, robots: Robots) -> Observations:
+        shown = observations.copy()
+        _turn(shown, self._directions.start + 2 * self._casters, self._cos[robots], self._sin[robots])
+        return shown
+
+
+class _SensorNoise(Runtime):
+    """Errors e are measured minus true: place and twist in B, then heading, steering angles and joint rates."""
+
+    def __init__(self, feature: SensorNoise, place: Place) -> None:
+        self._place = place
+        layout, casters = place.engine.layout, place.engine.robot.caster_count
+        body = [feature.position] * 2 + [feature.heading] + [feature.speed] * 2 + [feature.yaw_rate]
+        self._noise = np.array(body + [feature.steering] * casters + [feature.joint_rate] * (2 * casters))
+        self._bias = np.zeros(len(self._noise))
+        self._bias[:6] = (
+            [feature.position_bias] * 2 + [feature.heading_bias] + [feature.speed_bias] * 2 + [feature.yaw_rate_bias]
+        )
+        self._noisy, self._biased = np.flatnonzero(self._noise), np.flatnonzero(self._bias)
+        self._wrong = {int(i) for i in (*self._noisy, *self._biased)}
+        self._constant = np.zeros((place.count, len(self._noise)))
+        self._directions = place.part("directions").place.start + 2 * np.arange(casters)
+        self._scales = {part.name: part.scale for part in layout.parts}
+        previews = [part.name for part in layout.parts if part.name.startswith("preview_")]
+        self._points = ["position_error", *previews]
+        starts = {part.name: part.place.start for part in layout.parts}
+        pairs = [starts["position_error"], starts["heading_error"], starts["reference_acceleration"]]
+        self._pairs = np.array(pairs + [starts[name] + first for name in previews for first in (0, 2, 4)])
+
+    def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
+        drawn = normals(self._place.seeds[robots], self._biased)
+        self._constant[np.ix_(robots, self._biased)] = self._bias[self._biased] * drawn
+
+    def observe(self, observations: Observations, robots: Robots) -> Observations:
+        if not self._wrong:
+            return observations
+        errors = self._errors(robots)
+        shown = observations.astype(np.float64)
+        if {0, 1, 2, 3, 4, 5} & self._wrong:
+            self._misjudge_pose_and_twist(shown, errors)
+        casters = len(self._directions)
+        if 6 in self._wrong:
+            angles = errors[:, 6 : 6 + casters]
+            _turn(shown, self._directions, np.cos(angles), np.sin(angles))
+        if 6 + casters in self._wrong:
+            shown[:, self._place.part("joint_rates").place] += errors[:, 6 + casters :] / self._scales["joint_rates"]
+        return np.clip(shown, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
+
+    def _errors(self, robots: Robots) -> Array:
+        """e (robots, 6 + 3 N) of the present control period."""
+        errors = self._constant[robots].copy()
+        if self._noisy.size:
+            clocks = self._place.clocks[robots, None]
+            indices = len(self._noise) * (clocks + 1) + self._noisy  # the first ones are those of the biases
+            errors[:, self._noisy] += self._noise[self._noisy] * normals(self._place.seeds[robots], indices)
+        return errors
+
+    def _misjudge_pose_and_twist(self, shown: Array, errors: Array) -> None:
+        """Put errors of place, heading and twist into all that follows from them."""
+        twist, error = self._place.part("twist").place, self._place.part("twist_error").place
+        ratio = self._scales["twist"] / self._scales["twist_error"]
+        reference = shown[:, error] + ratio * shown[:, twist]  # velocity of the reference, in units of the error
+        for name in self._points:
+            start = self._place.part(name).place.start
+            shown[:, start : start + 2] -= errors[:, :2] / self._scales[name][:2]
+        if 2 in self._wrong:
+            cos, sin = np.cos(errors[:, 2:3]), -np.sin(errors[:, 2:3])
+            _turn(shown, self._pairs, cos, sin)
+            _turn(reference, np.zeros(1, dtype=np.int64), cos, sin)
+        shown[:, twist] += errors[:, 3:6] / self._scales["twist"]
+        shown[:, error] = reference - ratio * shown[:, twist]
+
+
+def _turn(rows: np.ndarray, first: np.ndarray, cos: Array, sin: Array) -> None:
+    """Turn the pairs that begin in some columns, in place, counter-clockwise."""
+    x, y = rows[:, first], rows[:, first + 1]
+    rows[:, first], rows[:, first + 1] = cos * x - sin * y, sin * x + cos * y

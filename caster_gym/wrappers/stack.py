@@ -1,0 +1,128 @@
+"""The features of an environment at work, in their order, for one robot or for a batch."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from caster_gym.configuration import ConfigurationError, did_you_mean
+from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
+from caster_gym.wrappers.draws import seeds_of, stream
+from caster_gym.wrappers.feature import (
+    Actions,
+    Array,
+    Feature,
+    Flags,
+    Observations,
+    Place,
+    PlantRuntime,
+    PushingRuntime,
+    Quantities,
+    RewardRuntime,
+    Robots,
+    Runtime,
+)
+
+if TYPE_CHECKING:
+    from caster_gym.envs.task import Task
+    from caster_gym.envs.task_engine import TaskEngine
+
+EVERYONE = slice(None)
+
+
+class Stack:
+    """Features in the order of their list, from the environment outwards.
+
+    Actions pass the last feature first, observations the first one. An engine tells of new episodes while it starts
+    them, when the features that change the plant do their work; all others begin once the last step of the episode
+    before has been looked at.
+    """
+
+    def __init__(self, engine: "TaskEngine", task: "Task", features: Sequence[Feature], space: "Box[Any]") -> None:
+        if any(isinstance(getattr(hook, "__self__", None), Stack) for hook in engine.on_restart):
+            raise ValueError("this environment has been wrapped before: give all features to one call of wrap")
+        self._engine, self._task, self.action_space = engine, task, space
+        self._clocks = np.zeros(engine.count, dtype=np.int64)
+        self._seeds = np.zeros((len(features), engine.count), dtype=np.uint64)
+        self._coming = self._seeds.copy()  # of the episodes that the engine has started
+        self._streams = [stream(place, getattr(feature, "kind", "")) for place, feature in enumerate(features)]
+        self._runtimes = [self._started(i, feature) for i, feature in enumerate(features)]
+        self._rewards = [one for one in self._runtimes if isinstance(one, RewardRuntime)]
+        self._plants = [(i, one) for i, one in enumerate(self._runtimes) if isinstance(one, PlantRuntime)]
+        self._pushes = [one for one in self._runtimes if isinstance(one, PushingRuntime)]
+        names = [reward.name for reward in self._rewards]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise ValueError(f"the reward term {min(twice)!r} is there twice: give one of them another 'name'")
+        if taken := set(names) & set(engine.plan.terms):
+            raise ValueError(f"the task has a reward term {min(taken)!r} of its own: give yours another 'name'")
+        self._nominal = np.array([pack_parameters(robot_parameters(engine.robot))])
+        engine.on_restart.append(self._on_restart)
+
+    def _started(self, index: int, feature: Feature) -> Runtime:
+        width = self.action_space.shape[0]
+        runtime = feature.runtime(Place(self._engine, self._task, width, self._seeds[index], self._clocks))
+        self.action_space = runtime.action_space or self.action_space
+        return runtime
+
+    def _on_restart(self, robots: NDArray[np.int64]) -> None:
+        keys, episodes = self._engine.episodes(robots)
+        for i, of in enumerate(self._streams):
+            self._coming[i, robots] = seeds_of(keys, episodes, of)
+        if self._plants:
+            rows = np.repeat(self._nominal, len(robots), axis=0)
+            for i, plant in self._plants:
+                rows = plant.rebuild(rows, self._coming[i, robots])
+            self._engine.set_parameters(robots, rows)
+
+    def begin(self, robots: NDArray[np.int64], observations: Observations, infos: Mapping[str, Any]) -> Observations:
+        """What some robots show after their reset; observations are theirs, infos those of all robots."""
+        self._seeds[:, robots] = self._coming[:, robots]
+        self._clocks[robots] = 0
+        quantities = _quantities(infos, {}, np.zeros(0, dtype=np.bool_))
+        for runtime in self._runtimes:
+            runtime.begin(robots, quantities)
+        return self.observe(observations, robots)
+
+    def act(self, actions: Actions) -> Actions:
+        """Actions for the environment, and pushes for its plant."""
+        for runtime in reversed(self._runtimes):
+            actions = runtime.act(actions)
+        if self._pushes:
+            self._engine.wrenches = sum((push.wrenches() for push in self._pushes), np.zeros((self._engine.count, 3)))
+        return actions
+
+    def score(
+        self, infos: Mapping[str, Any], final: Mapping[str, Any], ended: Flags, terminated: Flags
+    ) -> dict[str, Array]:
+        """Terms (robots,) of a step by name. Robots in `ended` have their last quantities in `final`."""
+        self._clocks += 1
+        quantities = _quantities(infos, final, ended)
+        return {reward.name: reward.term(quantities, terminated) for reward in self._rewards}
+
+    def observe(self, observations: Observations, robots: Robots = EVERYONE) -> Observations:
+        """What is shown of some robots whose environment shows these observations."""
+        for runtime in self._runtimes:
+            observations = runtime.observe(observations, robots)
+        return observations
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the added reward terms."""
+        return tuple(reward.name for reward in self._rewards)
+
+
+def _quantities(infos: Mapping[str, Any], final: Mapping[str, Any], ended: Flags) -> Quantities:
+    """Looks quantities up by name, those of robots whose episode has ended among the final ones."""
+
+    def look_up(name: str) -> Array:
+        if name not in infos:
+            numbers = [key for key, value in infos.items() if isinstance(value, np.ndarray) and value.dtype.kind == "f"]
+            raise ConfigurationError(f"info has no quantity {name!r} here; {did_you_mean(name, numbers)}")
+        values = np.asarray(infos[name], dtype=np.float64)
+        if not final:
+            return values
+        return np.where(ended.reshape(-1, *[1] * (values.ndim - 1)), final[name], values)
+
+    return look_up
