@@ -4,7 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help install benchmark test lint format clean
+.PHONY: help install benchmark pictures test lint format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
@@ -21,6 +21,9 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 benchmark: $(INSTALLED) ## Learned and model-based control compared; results in runs/benchmark
 	$(BIN)/caster-gym benchmark --config track --out runs/benchmark --overwrite
+
+pictures: $(INSTALLED) ## The README's pictures, in docs/pictures
+	$(BIN)/python -m scripts.draw_pictures --out docs/pictures
 
 test: lint ## Lint, then all tests
 	$(BIN)/python -m pytest

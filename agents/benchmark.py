@@ -1,5 +1,6 @@
 """The comparison: every agent on the same held-out paths, starts, sensors, preview and limits."""
 
+import csv
 import multiprocessing
 import os
 import queue
@@ -12,12 +13,13 @@ from typing import Any, NamedTuple
 from tqdm import tqdm
 
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
 
 from .bundle import load_bundle
 from .computed_torque import ComputedTorque
-from .evaluation import Episodes, measure, roll_out, test_batch
+from .evaluation import Batch, Episodes, bare, roll_out, test_batch
 from .figures import write_figures
+from .follow_metrics import FollowVerdict
+from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
 from .settings import (
@@ -30,7 +32,8 @@ from .settings import (
     read_settings,
 )
 from .summary import Result, table, write_episodes, write_summary
-from .training import VALIDATION_SEED, Validation, train
+from .track_metrics import TrackVerdict
+from .training import Validation, train, verdict_on
 
 
 class Job(NamedTuple):
@@ -84,6 +87,7 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
         for seed in settings.seeds
     ]
     test = test_batch(task, task.test, settings.starts)
+    plain = bare(test)
     validation = test_batch(task, task.validation, starts=1)
     test.reset(seed=settings.start_seed)
     test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
@@ -106,43 +110,44 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
     write_episodes(folder / "episodes.csv", results)
     write_summary(folder / "summary.csv", results, settings.confidence)
     (folder / "table.md").write_text(text + "\n", encoding="utf-8")
-    write_figures(folder, episodes, {job.name: read_history(job.folder) for job in jobs})
+    histories = {job.name: read_history(job.folder, yardstick(plain.task).verdict) for job in jobs}
+    write_figures(folder, episodes, histories, plain.engine.plan)
     write_provenance(
         folder,
         benchmark=settings.model_dump(mode="json"),
         task=task.model_dump(mode="json"),
         agents={name: agent.model_dump(mode="json") for name, agent in agents.items()},
         natural_frequencies={name: frequency for name, (_, frequency) in model_based.items()},
-        robot=test.robot.model_dump(mode="json"),
+        robot=plain.robot.model_dump(mode="json"),
     )
     return text
 
 
 def compare(
-    contenders: Sequence[Contender], test: CasterTrackVectorEnv, settings: BenchmarkSettings
+    contenders: Sequence[Contender], test: Batch, settings: BenchmarkSettings
 ) -> tuple[list[Result], dict[str, Episodes]]:
     """Results of all contenders on the same episodes, and the time series of each agent's first seed."""
-    driven = [test.robot.joints.index(joint) for joint in test.robot.driven]
+    how = yardstick(bare(test).task)
+    settling = how.settling if settings.settling is None else settings.settling
     results: list[Result] = []
     shown: dict[str, Episodes] = {}
     for name, agent, seed in tqdm(contenders, desc="evaluating", unit="agent"):
         episodes = roll_out(agent, test, settings.start_seed)
         shown.setdefault(name, episodes)
-        results.append(Result(name, seed, episodes.names, measure(episodes, settings.settling, driven)))
+        results.append(Result(name, seed, episodes.names, how.measure(episodes, settling)))
     return results, shown
 
 
-def tune(settings: ComputedTorqueSettings, validation: CasterTrackVectorEnv) -> tuple[ComputedTorque, float]:
+def tune(settings: ComputedTorqueSettings, validation: Batch) -> tuple[ComputedTorque, float]:
     """The controller whose natural frequency [rad/s] does best on validation paths, as policies are chosen there."""
-    driven = [validation.robot.joints.index(joint) for joint in validation.robot.driven]
-    best: tuple[tuple[float, float], ComputedTorque, float] | None = None
+    plain = bare(validation)
+    if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
+        raise ValueError(f"computed torque gives torques, but the task's actions are those of {redefining[0]!r}")
+    best: tuple[tuple[float, ...], ComputedTorque, float] | None = None
     for frequency in settings.natural_frequencies:
-        agent = ComputedTorque(validation.engine.layout, frequency, validation.task.control_period, settings.known)
-        metrics = measure(
-            roll_out(agent, validation, VALIDATION_SEED), BenchmarkSettings.model_fields["settling"].default, driven
-        )
-        merit = (float(metrics.failed.sum()), float(metrics.position_rmse[metrics.failed == 0].mean()))
-        if best is None or merit < best[0]:
+        agent = ComputedTorque(plain.engine.layout, frequency, plain.task.control_period, settings.known)
+        merit = verdict_on(agent, validation).merit
+        if best is None or merit > best[0]:
             best = (merit, agent, frequency)
     assert best is not None  # there is at least one natural frequency
     return best[1], best[2]
@@ -182,26 +187,34 @@ def _raise_errors(futures: Sequence["Future[None]"]) -> None:
 
 
 @contextmanager
-def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, float], None]]:
+def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
     done = [0] * len(jobs)
     with tqdm(total=sum(job.agent.steps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
 
-        def show(job: int, steps: int, error: float) -> None:
+        def show(job: int, steps: int, verdict: str) -> None:
             done[job] = min(steps, jobs[job].agent.steps)
             bar.n = sum(done)
-            if error == error:
-                bar.set_postfix_str(f"{jobs[job].name}: {1e3 * error:.2f} mm", refresh=False)
+            if verdict:
+                bar.set_postfix_str(f"{jobs[job].name}: {verdict}", refresh=False)
             bar.refresh()
 
         yield show
 
 
 def _train_job(index: int, job: Job, threads: int, reports: Any) -> None:
-    train(job.task, job.agent, job.seed, job.folder, lambda steps, error: reports.put((index, steps, error)), threads)
+    train(
+        job.task, job.agent, job.seed, job.folder, lambda steps, verdict: reports.put((index, steps, verdict)), threads
+    )
 
 
-def read_history(folder: Path) -> list[Validation]:
-    """The validations of a training run."""
-    lines = (folder / "validation.csv").read_text(encoding="utf-8").splitlines()[1:]
-    rows = [[float(cell) for cell in line.split(",")] for line in lines]
-    return [Validation(int(r[0]), r[1], r[2], r[3], r[4], int(r[5]), r[6]) for r in rows]
+def read_history(folder: Path, verdict: type[TrackVerdict] | type[FollowVerdict]) -> list[Validation]:
+    """The validations of a training run on a task with these verdicts."""
+    with (folder / "validation.csv").open(newline="", encoding="utf-8") as file:
+        return [
+            Validation(
+                int(row["steps"]),
+                float(row["seconds"]),
+                verdict._make(float(row[name]) for name in verdict._fields),
+            )
+            for row in csv.DictReader(file)
+        ]

@@ -6,7 +6,7 @@ weights.safetensors    the actor's weights
 
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,18 +16,23 @@ from pydantic import PositiveInt
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
-from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.configuration import ConfigurationError, parse, read_yaml
+from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import Robot
+from caster_gym.wrappers.feature import Feature
+from caster_gym.wrappers.specification import FeatureSpecification
 
 from .actor import Actor, LearnedAgent, Squash
+from .settings import ChosenTask
 
 FORMAT = 1
+UNITS: dict[str, Literal["s", "m"]] = {"track": "s", "follow": "m"}  # of each environment's preview
 DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
 
 
-class PolicyDescription(Frozen):
+class PolicyDescription(ChosenTask):
     """All that is needed to act again, and to know where the policy came from."""
 
     format: Literal[1]
@@ -35,14 +40,17 @@ class PolicyDescription(Frozen):
     squash: Squash
     hidden: tuple[PositiveInt, ...]
     robot: Robot
-    task: TrackTask
+    task: TrackTask | FollowTask
+    wrappers: tuple[FeatureSpecification, ...] = ()  # features of the environment that it acts in
+    actions: PositiveInt | None = None  # None: one for each driven joint
     trained_with: dict[str, Any]  # settings, seed, steps
     versions: dict[str, str]
 
     @property
     def layout(self) -> ObservationLayout:
         """What the policy's observations mean."""
-        return ObservationLayout(self.robot, self.task.preview)
+        unit = UNITS[self.environment]
+        return ObservationLayout(self.robot, self.task.preview, unit, self.task.nearest)
 
 
 class Bundle:
@@ -52,8 +60,11 @@ class Bundle:
         self.description = description
         self.agent = LearnedAgent(actor, description.name)
 
-    def check_fits(self, layout: ObservationLayout, period: float) -> None:
-        """Raises ValueError if the policy cannot act on observations of that layout, every period [s]."""
+    def check_fits(self, layout: ObservationLayout, period: float, features: Sequence[Feature] = ()) -> None:
+        """Raises ValueError if the policy cannot act on observations of that layout, every period [s].
+
+        features: those of the environment; a policy needs those that say what its actions mean.
+        """
         ours = self.description.layout
         if ours.robot.joints != layout.robot.joints or ours.robot.driven != layout.robot.driven:
             raise ValueError(
@@ -64,8 +75,27 @@ class Bundle:
             raise ValueError(
                 f"the policy acts every {self.description.task.control_period:g} s, the task every {period:g} s"
             )
+        if ours.unit != layout.unit:
+            learned, asked = (_TOLD[unit] for unit in (ours.unit, layout.unit))
+            raise ValueError(f"the policy has learned to {learned}, the task is to {asked}")
         if ours.preview != layout.preview:
-            raise ValueError(f"the policy needs a preview of {ours.preview} s, the task shows {layout.preview} s")
+            raise ValueError(
+                f"the policy needs a preview of {ours.preview} {ours.unit}, the task shows {layout.preview} {ours.unit}"
+            )
+        if ours.nearest != layout.nearest:
+            raise ValueError(f"the policy sees {ours.nearest} obstacles, the task shows {layout.nearest}")
+        meant, understood = (
+            [feature for feature in some if feature.redefines_actions] for some in (self.description.wrappers, features)
+        )
+        if meant != understood:
+            raise ValueError(f"the policy's actions are {_named(meant)}, the task takes {_named(understood)}")
+
+
+_TOLD = {"s": "follow a timetable (environment 'track')", "m": "follow a path at its own pace (environment 'follow')"}
+
+
+def _named(features: Sequence[Feature]) -> str:
+    return ", ".join(repr(feature) for feature in features) or "torques"
 
 
 def save_bundle(folder: Path, bundle: Bundle) -> None:
@@ -95,7 +125,8 @@ def load_bundle(folder: Path) -> Bundle:
             f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
         )
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
-    actor = Actor(description.layout.size, description.hidden, len(description.robot.driven), description.squash)
+    actions = description.actions or len(description.robot.driven)
+    actor = Actor(description.layout.size, description.hidden, actions, description.squash)
     _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
     return Bundle(description, actor)
 

@@ -1,4 +1,4 @@
-"""The command caster-gym: train, evaluate, benchmark."""
+"""The command caster-gym: train, evaluate, benchmark, watch."""
 
 import shutil
 from collections.abc import Iterator
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from gymnasium.error import DependencyNotInstalled
 from tqdm import tqdm
 
 from caster_gym.configuration import parse_yaml
@@ -47,6 +48,7 @@ def train(
 ) -> None:
     """Train a policy; the best one on validation paths is OUT/best, a folder that `evaluate` reads."""
     with _plain_errors():
+        from .metrics import in_words
         from .training import train as run
 
         settings = read_agent(agent, _parsed(change))
@@ -56,16 +58,15 @@ def train(
         _prepare(out, overwrite)
         with tqdm(total=settings.steps, desc=f"{agent} seed {seed}", unit="step", unit_scale=True) as bar:
 
-            def report(steps: int, error: float) -> None:
+            def report(steps: int, verdict: str) -> None:
                 bar.n = min(steps, settings.steps)
-                if error == error:
-                    bar.set_postfix_str(f"validation {1e3 * error:.2f} mm", refresh=False)
+                bar.set_postfix_str(verdict, refresh=False)
                 bar.refresh()
 
             best = run(tasks, settings, seed, out, report)
         typer.echo(
-            f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: position RMSE "
-            f"{1e3 * best.position_rmse:.2f} mm, {best.failures} failures. It is in {out / 'best'}."
+            f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: {in_words(best.verdict)}. "
+            f"It is in {out / 'best'}."
         )
 
 
@@ -81,7 +82,7 @@ def evaluate(
     with _plain_errors():
         from .benchmark import Contender, compare, tune
         from .bundle import load_bundle
-        from .evaluation import test_batch
+        from .evaluation import bare, test_batch
         from .figures import write_figures
         from .provenance import write_provenance
         from .summary import table, write_episodes, write_summary
@@ -89,9 +90,10 @@ def evaluate(
         tasks = read_settings(TaskSettings, "tasks", task)
         settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
         test = test_batch(tasks, tasks.test, starts)
+        plain = bare(test)
         if Path(policy).is_dir():
             bundle = load_bundle(Path(policy))
-            bundle.check_fits(test.engine.layout, test.task.control_period)
+            bundle.check_fits(plain.engine.layout, plain.task.control_period, tasks.wrappers)
             contender = Contender(bundle.agent.name, bundle.agent, None)
         else:
             known = read_agent(policy)
@@ -105,7 +107,7 @@ def evaluate(
         write_episodes(out / "episodes.csv", results)
         write_summary(out / "summary.csv", results, settings.confidence)
         (out / "table.md").write_text(text + "\n", encoding="utf-8")
-        write_figures(out, episodes, {})
+        write_figures(out, episodes, {}, plain.engine.plan)
         write_provenance(out, policy=policy, task=tasks.model_dump(mode="json"), starts=starts)
         typer.echo(text)
         typer.echo(f"Results and figures are in {out}.")
@@ -127,6 +129,32 @@ def benchmark(
         _prepare(out, overwrite)
         typer.echo(run_benchmark(comparison, out))
         typer.echo(f"Results, policies and figures are in {out}.")
+
+
+@app.command()
+def watch(
+    agent: Annotated[
+        str,
+        typer.Argument(
+            help="Folder of a trained policy, name of a model-based agent, or keyboard: W, A, S, D or arrows drive, "
+            "Q and E turn."
+        ),
+    ] = "computed_torque",
+    task: TaskName = "track",
+    path: Annotated[str, typer.Option(help="Name or index of a test path; the first robot's, of several.")] = "0",
+    robots: Annotated[int, typer.Option(help="How many, each on a test path of its own.", min=1, max=16)] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the starts.", min=0, max=2**32 - 1)] = 0,
+    save: Annotated[Path | None, typer.Option(help="Film to write instead of a window: run.mp4 or run.gif.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a film that is there.")] = False,
+    seconds: Annotated[float | None, typer.Option(help="Stop after that time.")] = None,
+) -> None:
+    """Show an agent on the test paths of a task, or drive yourself: in a window, or as a film."""
+    with _plain_errors():
+        from .watch import watch as run
+
+        frames = run(agent, task, path, robots, seed, save, overwrite, seconds)
+        if save is not None:
+            typer.echo(f"{frames} frames are in {save}.")
 
 
 def _parsed(changes: list[str] | None) -> dict[str, Any]:
@@ -160,7 +188,7 @@ def _plain_errors() -> Iterator[None]:
     """Errors of the user's making as one sentence, and a quiet end on Ctrl-C."""
     try:
         yield
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, DependencyNotInstalled) as error:
         typer.echo(f"caster-gym: {error}", err=True)
         raise typer.Exit(2) from error
     except KeyboardInterrupt:

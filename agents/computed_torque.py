@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.analysis.actuation import warn_if_singular
+from caster_gym.control.torque_distribution import distribute
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.robot import Robot
-
-from .torque_distribution import distribute
 
 Array = NDArray[np.float64]
 KnownModel = Literal["exact", "without D1", "without wheels"]
@@ -110,7 +109,12 @@ class ComputedTorque:
         now = self.layout.physical(observations, "reference_acceleration")
         if not self.layout.preview:
             return now
-        horizon = min(self.layout.preview)
-        later = self.layout.physical(observations, f"preview_{horizon:g}s")[:, 4:]
+        ahead = min(self.layout.preview)
+        later = self.layout.physical(observations, f"preview_{ahead:g}{self.layout.unit}")[:, 4:]
+        horizon = np.full((len(now), 1), ahead)
+        if self.layout.unit == "m":
+            speeds = np.hypot(*velocity[:, :2].T) + np.hypot(*later[:, :2].T)
+            horizon[:, 0] = np.maximum(2.0 * ahead / np.maximum(speeds, 1e-9), self.period)
         jerk = 2.0 * (later - velocity - horizon * now) / horizon**2
-        return now + 0.5 * self.period * jerk
+        mean: Array = now + 0.5 * self.period * jerk
+        return mean

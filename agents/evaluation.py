@@ -1,22 +1,45 @@
-"""Episodes of an agent on given paths and starts, and what they measure."""
+"""Batches of robots for training and for evaluation, and episodes of an agent on given paths and starts."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+from caster_gym.envs.caster_follow import CasterFollowVectorEnv
+from caster_gym.envs.caster_track import CasterTrackVectorEnv
+from caster_gym.envs.caster_vector_env import CasterVectorEnv
+from caster_gym.envs.guides import Courses
+from caster_gym.envs.task_engine import Plan
+from caster_gym.paths.time_law import row_times
+from caster_gym.wrappers import Feature, FeatureVectorEnv, wrap
 
 from .protocol import Agent
 from .settings import Paths, TaskSettings
 
 Array = NDArray[np.float64]
-SATURATED = 0.999  # commands from here on count as saturated, and torques that differ from theirs by the rest
+Batch: TypeAlias = CasterVectorEnv | FeatureVectorEnv
+
+_BATCHES: dict[str, type[CasterTrackVectorEnv | CasterFollowVectorEnv]] = {
+    "track": CasterTrackVectorEnv,
+    "follow": CasterFollowVectorEnv,
+}
+
+
+_AS_TOLD = (
+    "position_error",
+    "heading_error",
+    "torque",
+    "pose",
+    "progress",
+    "impacts",
+    "normal_impulse",
+    "clearance",
+)  # by info, under the same names
 
 
 class Episodes(NamedTuple):
-    """Time series of episodes (steps, episodes, …); NaN after an episode has ended."""
+    """Time series of episodes (steps, episodes, …), NaN after an episode has ended; and facts of each (episodes,)."""
 
     names: tuple[str, ...]  # of the path of each episode
     period: float  # [s]
@@ -24,121 +47,103 @@ class Episodes(NamedTuple):
     heading_error: Array  # [rad]
     torque: Array  # (steps, episodes, 2 N) of the motors [N m]
     share: Array  # the same as shares of their greatest torques
-    command: Array  # (steps, episodes, driven motors) actions, in −1 … 1
+    command: Array  # (steps, episodes, driven motors) shares asked for, in −1 … 1; of wrapped robots, those given
     pose: Array  # (steps, episodes, 4): x, y, cos β, sin β in W
     reference: Array  # the same of the reference
-    reward: Array
+    reward: Array  # of the task alone
+    progress: Array  # [m]
+    impacts: Array  # in each control period
+    normal_impulse: Array  # [N s] likewise
+    clearance: Array  # [m] inf where there is no obstacle
+    driven: list[int]  # indices of the driven motors
     failed: NDArray[np.bool_]  # (episodes,)
+    allowed: NDArray[np.int64]  # (episodes,) control periods of an episode that does not fail
+    goal: Array  # (episodes,) [m] progress with which the path is done; NaN where a clock leads
+    law: Array  # (episodes,) [s] that the time law takes; NaN likewise
 
 
-class Metrics(NamedTuple):
-    """One number per episode (episodes,)."""
-
-    position_rmse: Array  # [m] after settling
-    heading_rmse: Array  # [rad] after settling
-    worst_position: Array  # [m] after settling
-    position_rmse_transient: Array  # [m] before
-    heading_rmse_transient: Array  # [rad] before
-    effort: Array  # mean square torque as a share of the limits
-    peak_torque: Array  # [N m]
-    torque_variation: Array  # [1/s] total variation of the torque shares per second, mean over driven motors
-    saturation: Array  # share of torques that a motor's limit cut, or that were asked at the limit
-    reward: Array  # mean per step
-    failed: Array  # 1 or 0
+def bare(batch: Batch) -> CasterVectorEnv:
+    """The batch without its features: it has the engine, the task and the robot."""
+    return cast(CasterVectorEnv, batch.unwrapped)
 
 
-def test_batch(settings: TaskSettings, paths: Paths, starts: int) -> CasterTrackVectorEnv:
+def make_batch(
+    settings: TaskSettings, paths: Paths, count: int, mode: AutoresetMode, features: tuple[Feature, ...] = ()
+) -> Batch:
+    """So many robots on these paths, with these features."""
+    batch = _BATCHES[settings.environment](
+        count,
+        settings.robot,
+        paths,
+        settings.actuation,
+        settings.arena,
+        autoreset_mode=mode,
+        **settings.task.model_dump(),
+    )
+    return wrap(batch, *features) if features else batch
+
+
+def test_batch(settings: TaskSettings, paths: Paths, starts: int) -> Batch:
     """A batch with one robot for every start on every path; robots 0, 1, … follow path 0, 1, …, then again."""
-    single = CasterTrackVectorEnv(1, settings.robot, paths, settings.actuation, **_fields(settings))
-    count = len(single.engine.trajectories) * starts
-    return CasterTrackVectorEnv(
-        count, settings.robot, paths, settings.actuation, AutoresetMode.NEXT_STEP, **_fields(settings)
-    )
+    single = make_batch(settings, paths, 1, AutoresetMode.NEXT_STEP)
+    count = len(bare(single).engine.plan.names) * starts
+    return make_batch(settings, paths, count, AutoresetMode.NEXT_STEP, settings.wrappers)
 
 
-def training_batch(settings: TaskSettings, robots: int) -> CasterTrackVectorEnv:
-    """A batch on training paths, as SB3 wants it."""
-    return CasterTrackVectorEnv(
-        robots, settings.robot, settings.train, settings.actuation, AutoresetMode.SAME_STEP, **_fields(settings)
-    )
+def training_batch(settings: TaskSettings, robots: int) -> Batch:
+    """A batch on training paths, with shaped rewards, as SB3 wants it."""
+    features = (*settings.wrappers, *settings.shaping)
+    return make_batch(settings, settings.train, robots, AutoresetMode.SAME_STEP, features)
 
 
-def _fields(settings: TaskSettings) -> dict[str, Any]:
-    return settings.task.model_dump()
-
-
-def roll_out(agent: Agent, batch: CasterTrackVectorEnv, seed: int) -> Episodes:
+def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
     """One episode of every robot of a test batch, from starts that depend on the seed alone."""
-    trajectories = batch.engine.trajectories
-    index = np.arange(batch.num_envs) % len(trajectories)
-    observations, _ = batch.reset(seed=seed, options={"path": index})
+    plain = bare(batch)
+    plan, robot = plain.engine.plan, plain.robot
+    path = np.arange(batch.num_envs) % len(plan.names)
+    observations, _ = batch.reset(seed=seed, options={"path": path})
     running = np.ones(batch.num_envs, dtype=np.bool_)
     failed = np.zeros(batch.num_envs, dtype=np.bool_)
-    rows: list[tuple[Array, ...]] = []
-    limits = np.array([motor.max_torque for caster in batch.robot.casters for motor in (caster.roll, caster.steer)])
+    limits = np.array([motor.max_torque for caster in robot.casters for motor in (caster.roll, caster.steer)])
+    driven = [robot.joints.index(joint) for joint in robot.driven]
+    rows: list[dict[str, Array]] = []
     while running.any():
         actions = agent.act(observations)
         observations, rewards, terminated, truncated, info = batch.step(actions)
-        row = (
-            info["position_error"],
-            info["heading_error"],
-            info["torque"],
-            info["torque"] / limits,
-            actions,
-            info["pose"],
-            info["reference_pose"],
-            rewards,
-        )
-        rows.append(tuple(np.where(running.reshape(-1, *[1] * (x.ndim - 1)), x, np.nan) for x in row))
+        share = info["torque"] / limits
+        row = {
+            "share": share,
+            "command": actions if batch is plain else share[:, driven],
+            "reference": info["reference_pose"],
+            "reward": info.get("task_reward", rewards),
+            **{name: info[name] for name in _AS_TOLD},
+        }
+        rows.append({name: np.where(_beside(running, one), one, np.nan) for name, one in row.items()})
         failed |= running & terminated
         running &= ~(terminated | truncated)
-    position, heading, torque, share, command, pose, reference, reward = (
-        np.stack(column) for column in zip(*rows, strict=True)
-    )
-    names = tuple(trajectories[i].name for i in index)
-    period = batch.task.control_period
-    return Episodes(names, period, position, heading, torque, share, command, pose, reference, reward, failed)
-
-
-def measure(episodes: Episodes, settling: float, driven: list[int]) -> Metrics:
-    """Metrics of episodes, transient (before `settling` seconds) and steady apart; driven: indices of driven motors.
-
-    An episode that failed counts with what it did before; one that failed before settling has no steady values (NaN).
-    """
-    first = round(settling / episodes.period)
-    share = episodes.share[..., driven]
-    limited = np.abs(share - episodes.command) > 1.0 - SATURATED
-    at_limit = limited | (np.abs(episodes.command) >= SATURATED)
-    steps = np.isfinite(episodes.reward).sum(axis=0)
-    change = np.nansum(np.abs(np.diff(share, axis=0)), axis=0) / (steps * episodes.period)[:, None]
-    return Metrics(
-        position_rmse=_rms(episodes.position_error[first:]),
-        heading_rmse=_rms(episodes.heading_error[first:]),
-        worst_position=_greatest(episodes.position_error[first:]),
-        position_rmse_transient=_rms(episodes.position_error[:first]),
-        heading_rmse_transient=_rms(episodes.heading_error[:first]),
-        effort=_mean(np.square(share).mean(axis=-1)),
-        peak_torque=_greatest(np.abs(episodes.torque).max(axis=-1)),
-        torque_variation=change.mean(axis=-1),
-        saturation=at_limit.sum(axis=(0, 2)) / (steps * at_limit.shape[2]),
-        reward=_mean(episodes.reward),
-        failed=episodes.failed.astype(np.float64),
+    goals, laws = _goals(plan)
+    return Episodes(
+        tuple(plan.names[i] for i in path),
+        plain.task.control_period,
+        **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
+        driven=driven,
+        failed=failed,
+        allowed=plan.guide.spans[path, 2],
+        goal=goals[path],
+        law=laws[path],
     )
 
 
-def _mean(series: Array) -> Array:
-    """Mean over time of what is there; NaN where nothing is."""
-    there = np.isfinite(series)
-    count = there.sum(axis=0)
-    total = np.where(there, series, 0.0).sum(axis=0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+def _beside(running: NDArray[np.bool_], values: Array) -> NDArray[np.bool_]:
+    """Flags (robots,) in a shape that goes with values (robots, …)."""
+    return running.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def _rms(series: Array) -> Array:
-    return np.sqrt(_mean(np.square(series)))
-
-
-def _greatest(series: Array) -> Array:
-    there = np.isfinite(series)
-    greatest = np.where(there, series, -np.inf).max(axis=0)
-    return np.where(there.any(axis=0), greatest, np.nan)
+def _goals(plan: Plan) -> tuple[Array, Array]:
+    """Of each path, progress with which it is done [m] and time of its law [s]; NaN where a clock leads."""
+    guide: Any = plan.guide
+    if not isinstance(guide, Courses):
+        return np.full(len(plan.names), np.nan), np.full(len(plan.names), np.nan)
+    lengths = (guide.spans[:, 1] - guide.spans[:, 0]) * guide.spacings
+    laws = [row_times(table[:, -1], spacing)[-1] for table, spacing in zip(plan.tables, guide.spacings, strict=True)]
+    return lengths - guide.arrival, np.array(laws)

@@ -1,4 +1,4 @@
-"""Pictures of a comparison: paths driven, errors over time, torques, and how the policies learned."""
+"""Pictures of a comparison: paths driven, errors over time, speeds, torques, and how the policies learned."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.envs.guides import Courses
+from caster_gym.envs.task_engine import Plan
+
 from .evaluation import Episodes
+from .measuring import Printed, shown
 from .training import Validation
 
 if TYPE_CHECKING:
@@ -16,13 +20,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Okabe and Ito's colours, distinguishable with colour-blind eyes
 COLOURS = ("#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#F0E442", "#000000")
+OBSTACLE = "0.75"
 MOST_PATHS = 6
+MAGNIFIED = 20.0  # how much larger tracking errors are drawn
 
 
 def write_figures(
-    folder: Path, episodes: Mapping[str, Episodes], histories: Mapping[str, Sequence[Validation]]
+    folder: Path, episodes: Mapping[str, Episodes], histories: Mapping[str, Sequence[Validation]], plan: Plan
 ) -> list[Path]:
-    """paths.png, errors.png, torques.png, learning.png (if anything learned) and overview.png; returns their paths."""
+    """Pictures of the episodes of a plan, by agent, and of what was learned, if anything; returns their paths.
+
+    paths.png, errors.png, torques.png, learning.png and overview.png; speeds.png of paths that are followed at the
+    robot's own pace.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -30,15 +40,21 @@ def write_figures(
 
     colours = dict(zip(episodes, COLOURS * (1 + len(episodes) // len(COLOURS)), strict=False))
     chosen = _telling_episodes(next(iter(episodes.values())).names)
+    own_pace = isinstance(plan.guide, Courses)
     figures: dict[str, Any] = {}
 
-    figure, axes = plt.subplots(2, 3, figsize=(12, 8), layout="constrained")
-    for axis, index in zip(axes.flat, chosen, strict=False):
-        draw_path(axis, episodes, index, colours)
-    for axis in axes.flat[len(chosen) :]:
-        axis.set_visible(False)
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure, places = _grid(len(chosen))
+    for axis, index in zip(places, chosen, strict=False):
+        draw_path(axis, episodes, index, colours, plan)
+    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     figures["paths"] = figure
+
+    if own_pace:
+        figure, places = _grid(len(chosen))
+        for axis, index in zip(places, chosen, strict=False):
+            draw_speeds(axis, episodes, index, colours, plan)
+        figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        figures["speeds"] = figure
 
     figure, (above, below) = plt.subplots(2, 1, figsize=(9, 7), sharex=True, layout="constrained")
     draw_errors(above, episodes, "position_error", 1e3, "position error [mm]", colours)
@@ -57,19 +73,24 @@ def write_figures(
     axes[0, 0].legend(fontsize="x-small", ncols=3)
     figures["torques"] = figure
 
-    if histories:
-        figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
-        draw_learning(axis, histories)
+    curves = learning_curves(histories)
+    if curves:
+        figure, axes = plt.subplots(1, len(curves), figsize=(7 * len(curves), 4.5), squeeze=False, layout="constrained")
+        for axis, (name, how) in zip(axes[0], curves.items(), strict=True):
+            draw_learning(axis, histories, name, how)
         figures["learning"] = figure
 
-    figure, axes = plt.subplots(1, 3 if histories else 2, figsize=(16 if histories else 11, 4.6), layout="constrained")
-    draw_path(axes[0], episodes, chosen[-1], colours)
-    draw_errors(axes[1], episodes, "position_error", 1e3, "position error [mm]", colours)
-    axes[1].set_xlabel("time [s]")
+    figure, axes = plt.subplots(1, 3 if curves else 2, figsize=(16 if curves else 11, 4.6), layout="constrained")
+    draw_path(axes[0], episodes, chosen[-1], colours, plan)
+    if own_pace:
+        draw_speeds(axes[1], episodes, chosen[-1], colours, plan)
+    else:
+        draw_errors(axes[1], episodes, "position_error", 1e3, "position error [mm]", colours)
+        axes[1].set_xlabel("time [s]")
+        axes[1].set_title("all test episodes: median, 10 to 90 %", fontsize="medium")
     axes[1].legend(fontsize="small")
-    axes[1].set_title("all test episodes: median, 10 to 90 %", fontsize="medium")
-    if histories:
-        draw_learning(axes[2], histories)
+    for name, how in list(curves.items())[-1:]:
+        draw_learning(axes[2], histories, name, how)
     figures["overview"] = figure
 
     written = []
@@ -81,25 +102,70 @@ def write_figures(
     return written
 
 
-def draw_path(axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str]) -> None:
-    """What each agent drove in one episode, over its reference; the error is drawn twenty times as large."""
+def draw_path(
+    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+) -> None:
+    """What each agent drove in one episode, over its path and among its obstacles.
+
+    Against a timetable, errors are drawn twenty times as large.
+    """
     first = next(iter(episodes.values()))
-    reference = first.reference[:, index]
-    axis.plot(reference[:, 0], reference[:, 1], color="0.6", linewidth=4, label="reference", solid_capstyle="round")
+    path = index % len(plan.names)
+    table = plan.tables[path]
+    own_pace = isinstance(plan.guide, Courses)
+    draw_obstacles(axis, plan, path)
+    name = "path" if own_pace else "reference"
+    axis.plot(table[:, 0], table[:, 1], color="0.6", linewidth=4, label=name, solid_capstyle="round")
     for agent, series in episodes.items():
-        pose, asked = series.pose[:, index], series.reference[:, index]
-        shown = asked[:, :2] + 20.0 * (pose[:, :2] - asked[:, :2])
-        settled = slice(round(2.0 / series.period), None)
-        axis.plot(shown[settled, 0], shown[settled, 1], color=colours[agent], linewidth=1.2, label=agent)
-    axis.plot(*reference[0, :2], "o", color="black", markersize=5)
-    low, high = np.nanmin(reference[:, :2], axis=0), np.nanmax(reference[:, :2], axis=0)
+        driven, asked = series.pose[:, index, :2], series.reference[:, index, :2]
+        if not own_pace:
+            driven = (asked + MAGNIFIED * (driven - asked))[round(2.0 / series.period) :]
+        axis.plot(driven[:, 0], driven[:, 1], color=colours[agent], linewidth=1.2, label=agent)
+    axis.plot(*table[0, :2], "o", color="black", markersize=5)
+    low, high = table[:, :2].min(axis=0), table[:, :2].max(axis=0)
     centre, reach = 0.5 * (low + high), 0.15 + 0.6 * float((high - low).max())
     axis.set_xlim(centre[0] - reach, centre[0] + reach)
     axis.set_ylim(centre[1] - reach, centre[1] + reach)
     axis.set_aspect("equal")
-    axis.set_title(f"{first.names[index]}, errors × 20 after 2 s", fontsize="medium")
+    remark = "" if own_pace else f", errors × {MAGNIFIED:g} after 2 s"
+    axis.set_title(f"{first.names[index]}{remark}", fontsize="medium")
     axis.set_xlabel("x [m]")
     axis.set_ylabel("y [m]")
+
+
+def draw_obstacles(axis: "Axes", plan: Plan, path: int) -> None:
+    """The obstacles beside one path."""
+    from matplotlib.patches import Circle, Polygon
+
+    obstacles = plan.around.obstacles
+    for k in range(*plan.arenas[path]):
+        first_face, _, first, end = obstacles.spans[k]
+        corners = obstacles.corners[first:end]
+        if len(corners) == 1:
+            axis.add_patch(Circle((corners[0, 0], corners[0, 1]), obstacles.radii[k], color=OBSTACLE, linewidth=0))
+        elif len(corners):
+            axis.add_patch(Polygon(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, linewidth=1.5))
+        else:
+            x, y, offset = obstacles.faces[first_face]
+            axis.axline((offset * x, offset * y), (offset * x - y, offset * y + x), color=OBSTACLE, linewidth=3)
+
+
+def draw_speeds(
+    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+) -> None:
+    """Speed along the path in one episode over the way, beside that of the time law."""
+    path = index % len(plan.names)
+    assert isinstance(plan.guide, Courses)
+    square = plan.tables[path][:, -1]
+    way = plan.guide.spacings[path] * np.arange(len(square))
+    axis.plot(way, np.sqrt(square), color="0.6", linewidth=4, label="time law")
+    for agent, series in episodes.items():
+        progress = series.progress[:, index]
+        axis.plot(progress[1:], np.diff(progress) / series.period, color=colours[agent], linewidth=1.2, label=agent)
+    axis.set_title(next(iter(episodes.values())).names[index], fontsize="medium")
+    axis.set_xlabel("progress [m]")
+    axis.set_ylabel("speed along the path [m/s]")
+    axis.grid(alpha=0.3)
 
 
 def draw_errors(
@@ -130,18 +196,34 @@ def draw_torques(axis: "Axes", series: Episodes, index: int) -> None:
     axis.grid(alpha=0.3)
 
 
-def draw_learning(axis: "Axes", histories: Mapping[str, Sequence[Validation]]) -> None:
-    """Error on validation paths over training time, a line for each seed."""
-    for i, (name, history) in enumerate(histories.items()):
+def learning_curves(histories: Mapping[str, Sequence[Validation]]) -> dict[str, Printed]:
+    """The numbers of the verdicts that are to be seen, with how; none if nothing learned."""
+    verdicts = {type(one.verdict) for history in histories.values() for one in history}
+    return {name: how for kind in verdicts for name, how in shown(kind) if isinstance(how, Printed)}
+
+
+def draw_learning(axis: "Axes", histories: Mapping[str, Sequence[Validation]], name: str, how: Printed) -> None:
+    """One number of the verdicts on validation paths over training time, a line for each seed."""
+    for i, (run, history) in enumerate(histories.items()):
         seconds = [one.seconds for one in history]
-        axis.plot(
-            seconds, [1e3 * one.position_rmse for one in history], ".-", color=COLOURS[i % len(COLOURS)], label=name
-        )
-    axis.set_yscale("log")
+        values = how.factor * np.array([getattr(one.verdict, name) for one in history])
+        values = np.where(np.isfinite(values), values, np.nan)
+        axis.plot(seconds, values, ".-", color=COLOURS[i % len(COLOURS)], label=run)
+    axis.set_yscale(how.scale)
     axis.set_xlabel("training time [s], one core for each seed")
-    axis.set_ylabel("validation position RMSE [mm]")
+    axis.set_ylabel(f"validation {how.label}")
     axis.grid(alpha=0.3)
     axis.legend(fontsize="small")
+
+
+def _grid(used: int) -> tuple[Any, list["Axes"]]:
+    """A figure with a place for each path that is drawn."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 3, figsize=(12, 8), layout="constrained")
+    for axis in axes.flat[used:]:
+        axis.set_visible(False)
+    return figure, list(axes.flat)
 
 
 def _telling_episodes(names: Sequence[str]) -> list[int]:

@@ -11,7 +11,7 @@ import yaml
 
 import caster_gym
 
-PACKAGES = ("numpy", "numba", "gymnasium", "torch", "stable-baselines3", "daqp", "scipy")
+PACKAGES = ("numpy", "numba", "gymnasium", "torch", "stable-baselines3", "scipy")
 
 
 def versions() -> dict[str, str]:

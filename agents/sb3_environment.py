@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+from .evaluation import Batch, bare
 
 
 class CasterVecEnv(VecEnv):
-    """A CasterTrackVectorEnv with SB3's conventions: same-step reset, one info dictionary per robot.
+    """A batch of robots with SB3's conventions: same-step reset, one info dictionary per robot.
 
     Infos hold what SB3 needs, at the end of episodes only: `terminal_observation`, `TimeLimit.truncated`, and `episode`
     with its return `r`, length `l`, mean position error and failure. All quantities are in `last_infos` as arrays.
     """
 
-    def __init__(self, batch: CasterTrackVectorEnv) -> None:
+    def __init__(self, batch: Batch) -> None:
         if batch.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"SB3 needs AutoresetMode.SAME_STEP, got {batch.autoreset_mode}")
         self.batch = batch
@@ -31,6 +31,11 @@ class CasterVecEnv(VecEnv):
         self._actions: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
         self.render_mode = batch.render_mode
         super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)
+
+    @property
+    def actions(self) -> int:
+        """Number of actions of a robot."""
+        return int(np.prod(self.batch.single_action_space.shape or ()))
 
     def reset(self) -> VecEnvObs:
         """Start episodes of all robots, with the seeds given by `seed` if any."""
@@ -52,7 +57,7 @@ class CasterVecEnv(VecEnv):
         final = infos.get("final_info", {})
         error = np.where(done, final["position_error"], infos["position_error"]) if final else infos["position_error"]
         self._returns += rewards
-        self._errors += np.where(np.isfinite(error), error, self.batch.task.corridor)
+        self._errors += np.where(np.isfinite(error), error, bare(self.batch).task.corridor)
         self._lengths += 1
         self.last_infos = infos
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -77,7 +82,8 @@ class CasterVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of the batch, once for each robot asked for."""
-        return [getattr(self.batch, attr_name)] * len(list(self._get_indices(indices)))
+        owner = self.batch if hasattr(self.batch, attr_name) else self.batch.unwrapped
+        return [getattr(owner, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Not possible: the robots of a batch have no attributes of their own."""
@@ -94,8 +100,8 @@ class CasterVecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Nothing is drawn."""
-        return [None] * self.num_envs
+        """One picture of the first robots in a grid, or None where the batch draws none."""
+        return [self.batch.render() if self.render_mode == "rgb_array" else None]
 
     def _get_indices(self, indices: VecEnvIndices) -> Iterable[int]:
         return super()._get_indices(indices)

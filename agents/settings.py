@@ -5,30 +5,78 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, field_validator, model_validator
+from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator, model_validator
 
+from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.envs.follow_task import FollowTask
+from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
+from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
+from caster_gym.wrappers.specification import FeatureSpecification
 
 from .computed_torque import KnownModel
 
 Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
+Environment: TypeAlias = Literal["track", "follow"]
+RewardSpecification: TypeAlias = Annotated[
+    Potential | Tolerance | Effort | Smoothness | TractionUse | Impact, Field(discriminator="kind")
+]
+
+TASKS: dict[str, type[TrackTask | FollowTask]] = {"track": TrackTask, "follow": FollowTask}
 
 
-class TaskSettings(Frozen):
+class ChosenTask(Frozen):
+    """One of the environments, with the parameters of its task."""
+
+    environment: Environment = "track"  # CasterTrack-v0 or CasterFollow-v0
+    task: TrackTask | FollowTask = Field(default={}, validate_default=True)
+
+    @field_validator("task", mode="before")
+    @classmethod
+    def _of_its_environment(cls, task: Any, info: ValidationInfo) -> Any:
+        environment = info.data.get("environment", "track")
+        kind = TASKS[environment]
+        if isinstance(task, Mapping):
+            for other, model in TASKS.items():
+                if misplaced := sorted(task.keys() & (model.model_fields.keys() - kind.model_fields.keys())):
+                    raise ValueError(
+                        f"{misplaced[0]!r} is for environment {other!r}, got it with environment {environment!r}"
+                    )
+            return kind.model_validate(task)
+        if isinstance(task, Task) and not isinstance(task, kind):
+            raise ValueError(f"must be a {kind.__name__} in environment {environment!r}, got a {type(task).__name__}")
+        return task
+
+
+class TaskSettings(ChosenTask):
     """A robot, its task, and the paths to train, to choose and to test on."""
 
     robot: str = "chung2008"  # name, or path of a YAML file
     actuation: Literal["all"] | tuple[str, ...] | None = None  # None: as the robot file says
-    task: TrackTask = TrackTask()
+    arena: Arena = Arena()  # or the name of a YAML file
+    wrappers: tuple[FeatureSpecification, ...] = ()  # features in training and in evaluation alike
+    shaping: tuple[RewardSpecification, ...] = ()  # terms that are added to the reward in training alone
     train: Paths
     validation: Paths
     test: Paths
+
+    @field_validator("arena", mode="before")
+    @classmethod
+    def _arena_may_be_a_file(cls, arena: Any) -> Any:
+        return read_arena(arena) if arena is None or isinstance(arena, str | Path) else arena
+
+    @field_validator("wrappers", "shaping", mode="before")
+    @classmethod
+    def _features_may_be_names(cls, features: Any) -> Any:
+        if not isinstance(features, list | tuple):
+            return features
+        return [{"kind": feature} if isinstance(feature, str) else feature for feature in features]
 
     @model_validator(mode="after")
     def _paths_are_held_out(self) -> Self:
@@ -114,7 +162,7 @@ class BenchmarkSettings(Frozen):
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
     starts: PositiveInt = 1  # episodes on each test path, with different starts
     start_seed: Seed = 1000  # the same starts for every agent
-    settling: PositiveFloat = 2.0  # [s] what comes before counts as transient
+    settling: PositiveFloat | None = None  # [s] what comes before counts as transient; None: as suits the task
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
 
     @field_validator("seeds")

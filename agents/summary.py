@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from .evaluation import Metrics
+from .measuring import Counted, Printed, shown
+from .metrics import Metrics
 
 Array = NDArray[np.float64]
 RESAMPLES = 2000
@@ -22,27 +23,6 @@ class Result(NamedTuple):
     seed: int | None
     paths: tuple[str, ...]  # name of the path of each episode
     metrics: Metrics
-
-
-class Row(NamedTuple):
-    """A row of the printed table: a metric in a readable unit."""
-
-    metric: str
-    title: str
-    factor: float
-
-
-ROWS = (
-    Row("position_rmse", "position RMSE [mm]", 1e3),
-    Row("heading_rmse", "heading RMSE [mrad]", 1e3),
-    Row("worst_position", "worst position error [mm]", 1e3),
-    Row("position_rmse_transient", "position RMSE, transient [mm]", 1e3),
-    Row("heading_rmse_transient", "heading RMSE, transient [mrad]", 1e3),
-    Row("effort", "effort [% of limits squared]", 1e2),
-    Row("peak_torque", "peak torque [N m]", 1.0),
-    Row("torque_variation", "torque variation [1/s]", 1.0),
-    Row("saturation", "saturated [%]", 1e2),
-)
 
 
 class Estimate(NamedTuple):
@@ -98,26 +78,32 @@ def table(results: Sequence[Result], confidence: float) -> str:
         "",
         *[name if g[0].seed is None else f"{name}, {len(g)} seed{'s' * (len(g) > 1)}" for name, g in groups.items()],
     ]
-    body = [[row.title, *[_cell(g, row, confidence) for g in groups.values()]] for row in ROWS]
-    failed = [values_of(g, "failed") for g in groups.values()]
-    body.append(["failures", *[f"{int(f.sum())} of {f.size}" for f in failed]])
+    body = [
+        [how.label, *[_cell(values_of(g, name), how, confidence) for g in groups.values()]]
+        for name, how in shown(type(results[0].metrics))
+    ]
     widths = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
     lines = [[cell.ljust(width) for cell, width in zip(line, widths, strict=True)] for line in [head, *body]]
     rule = ["-" * width for width in widths]
     return "\n".join("| " + " | ".join(line) + " |" for line in [lines[0], rule, *lines[1:]])
 
 
-def _cell(group: Sequence[Result], row: Row, confidence: float) -> str:
-    found = estimate(values_of(group, row.metric) * row.factor, confidence)
+def _cell(values: Array, how: Printed | Counted, confidence: float) -> str:
+    """What the table says of the values (seeds, episodes) of an agent."""
+    if isinstance(how, Counted):
+        return f"{int(values.sum())} of {values.size}"
+    found = estimate(values * how.factor, confidence)
+    if np.isnan(found.mean):
+        return "–"
     cell = f"{found.mean:.3g} [{found.low:.3g}, {found.high:.3g}]"
-    return cell if len(group) < 2 else f"{cell}, seeds {found.seed_low:.3g} … {found.seed_high:.3g}"
+    return cell if len(values) < 2 else f"{cell}, seeds {found.seed_low:.3g} … {found.seed_high:.3g}"
 
 
 def write_episodes(path: Path, results: Sequence[Result]) -> None:
     """Every metric of every episode of every agent and seed, in SI units."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["agent", "seed", "episode", "path", *Metrics._fields])
+        writer.writerow(["agent", "seed", "episode", "path", *results[0].metrics._fields])
         for result in results:
             seed = "" if result.seed is None else result.seed
             for i, name in enumerate(result.paths):
@@ -130,6 +116,6 @@ def write_summary(path: Path, results: Sequence[Result], confidence: float) -> N
         writer = csv.writer(file)
         writer.writerow(["agent", "seeds", "episodes", "metric", *Estimate._fields])
         for agent, group in by_agent(results).items():
-            for metric in Metrics._fields:
+            for metric in group[0].metrics._fields:
                 found = estimate(values_of(group, metric), confidence)
                 writer.writerow([agent, len(group), len(group[0].paths), metric, *found])

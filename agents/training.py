@@ -9,25 +9,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
-
 from .actor import Actor
 from .bundle import Bundle, PolicyDescription, save_bundle
-from .evaluation import measure, roll_out, test_batch, training_batch
+from .evaluation import Batch, bare, roll_out, test_batch, training_batch
+from .metrics import Verdict, in_words, yardstick
+from .protocol import Agent
 from .provenance import versions, write_provenance
 from .sb3_environment import CasterVecEnv
 from .settings import Learner, PPOSettings, SACSettings, TaskSettings
 
 VALIDATION_SEED = 500
-SETTLING = 2.0  # [s]
-Report = Callable[[int, float], None]  # called with steps done and the last validation error [m]
+Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
 
 
 class Validation(NamedTuple):
@@ -35,16 +33,19 @@ class Validation(NamedTuple):
 
     steps: int
     seconds: float  # of training so far, validations left out
-    position_rmse: float  # [m] root mean square over episodes, after settling
-    worst_position: float  # [m]
-    heading_rmse: float  # [rad]
-    failures: int
-    reward: float  # mean per step
+    verdict: Verdict
 
     @property
-    def merit(self) -> tuple[int, float]:
-        """What makes a policy better than another: fewer failures, then a smaller error."""
-        return -self.failures, -self.position_rmse
+    def numbers(self) -> dict[str, float]:
+        """All numbers by name."""
+        return {"steps": self.steps, "seconds": self.seconds, **self.verdict._asdict()}
+
+
+def verdict_on(agent: Agent, validation: Batch) -> Verdict:
+    """How good an agent is on a batch of validation paths, always from the same starts."""
+    how = yardstick(bare(validation).task)
+    verdict: Verdict = how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
+    return verdict
 
 
 def make_learner(settings: PPOSettings | SACSettings, environment: CasterVecEnv, seed: int) -> BaseAlgorithm:
@@ -80,7 +81,7 @@ def make_learner(settings: PPOSettings | SACSettings, environment: CasterVecEnv,
         train_freq=1,
         gradient_steps=settings.updates,
         ent_coef=f"auto_{settings.entropy}",
-        target_entropy=settings.target_entropy * len(environment.batch.robot.driven),
+        target_entropy=settings.target_entropy * environment.actions,
         policy_kwargs=policy,
         seed=seed,
         device="cpu",
@@ -109,7 +110,7 @@ class Watcher(BaseCallback):
         folder: Path,
         settings: PPOSettings | SACSettings,
         describe: Callable[[int], PolicyDescription],
-        validation: CasterTrackVectorEnv,
+        validation: Batch,
         report: Report,
     ) -> None:
         super().__init__()
@@ -134,29 +135,19 @@ class Watcher(BaseCallback):
         if self.num_timesteps >= self._due:
             self._due += self.settings.steps / self.settings.validations
             self.validate()
-        self.report(self.num_timesteps, self.history[-1].position_rmse if self.history else float("nan"))
+        self.report(self.num_timesteps, in_words(self.history[-1].verdict) if self.history else "")
 
     def validate(self) -> None:
         """Try the present policy on the validation paths, keep it, and keep it as the best one if it is."""
         begun = time.perf_counter()
         bundle = Bundle(self.describe(self.num_timesteps), actor_of(self.model, self.settings))
-        driven = [self.validation.robot.joints.index(joint) for joint in self.validation.robot.driven]
-        metrics = measure(roll_out(bundle.agent, self.validation, VALIDATION_SEED), SETTLING, driven)
-        steady = np.isfinite(metrics.position_rmse)
-        result = Validation(
-            self.num_timesteps,
-            begun - self.started - self.spent,
-            _overall(metrics.position_rmse[steady]),
-            float(metrics.worst_position[steady].max()) if steady.any() else float("inf"),
-            _overall(metrics.heading_rmse[steady]),
-            int(metrics.failed.sum()),
-            float(np.nanmean(metrics.reward)),
-        )
+        verdict = verdict_on(bundle.agent, self.validation)
+        result = Validation(self.num_timesteps, begun - self.started - self.spent, verdict)
         self.history.append(result)
-        for name, value in result._asdict().items():
+        for name, value in result.numbers.items():
             self.logger.record(f"validation/{name}", value)
         save_bundle(self.folder / "checkpoints" / f"{self.num_timesteps:010d}", bundle)
-        if self.best is None or result.merit > self.best.merit:
+        if self.best is None or result.verdict.merit > self.best.verdict.merit:
             self.best = result
             save_bundle(self.folder / "best", bundle)
         self._write_history()
@@ -165,12 +156,8 @@ class Watcher(BaseCallback):
     def _write_history(self) -> None:
         with (self.folder / "validation.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(Validation._fields)
-            writer.writerows(self.history)
-
-
-def _overall(rmse: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(rmse)))) if rmse.size else float("inf")
+            writer.writerow(self.history[0].numbers)
+            writer.writerows(result.numbers.values() for result in self.history)
 
 
 def train(
@@ -191,8 +178,11 @@ def train(
             name=settings.algorithm.upper(),
             squash="clip" if isinstance(settings, PPOSettings) else "tanh",
             hidden=settings.hidden,
-            robot=validation.robot,
+            robot=bare(validation).robot,
+            environment=task.environment,
             task=task.task,
+            wrappers=task.wrappers,
+            actions=environment.actions,
             trained_with={**facts, "steps": steps},
             versions=versions(),
         )
@@ -208,7 +198,7 @@ def train(
     finally:
         if not watcher.history or watcher.history[-1].steps < learner.num_timesteps:
             watcher.validate()
-        history = [result._asdict() for result in watcher.history]
+        history = [result.numbers for result in watcher.history]
         write_provenance(
             folder,
             task=task.model_dump(mode="json"),

@@ -23,18 +23,31 @@ import numpy as np
 from tqdm import tqdm
 
 from caster_gym import Robot, load_robot
+from caster_gym.arena import Arena, distances
+from caster_gym.arena.arena import Pillar
+from caster_gym.arena.packing import surroundings
 from caster_gym.engines.numba_fleet import Fleet
 from caster_gym.engines.threads import get_threads, set_threads
 from scripts.mujoco_peer import joint_indices, mjcf
 
 ENVIRONMENT = "caster_gym:CasterTrack-v0"
+FOLLOW = "caster_gym:CasterFollow-v0"
+COURSES = {"shape": "random_paths", "count": 16, "reversing": 0.0, "min_radius": 0.15}
 WIDE = 20.0  # [m] corridor that random actions do not leave, so that episodes end by time
 ACTION = 0.1  # [-] random actions and torques, as shares of the greatest torques
+SPEED = 0.5  # [m/s, rad/s] standard deviation of the random motions at the start
 RK4_STEP = 0.005  # [s] the environments' own
 MUJOCO_STEP = 0.002  # [s] its default, above which its wheels slip noticeably
-EXCERPT = 2.0  # [s] of motion from rest, for the bare equations as for MuJoCo
+EXCERPT = 2.0  # [s] of motion, for the bare equations as for MuJoCo
 BANK = 64  # batches of actions drawn beforehand
+ROOM = Arena(
+    room=((-2.0, -2.0), (2.0, 2.0)),
+    pillars=tuple(Pillar(centre=(x, y), radius=0.15) for x in (-1.0, 1.0) for y in (-1.0, 1.0)),
+)
 EQUATIONS = "bare RK4, batch of 4,096, 1 core"
+AMONG = "bare RK4 among 8 obstacles, batch of 4,096, 1 core"
+FOLLOWING = "following among 6 obstacles, batch of 1,024, 1 core"
+FREE_FOLLOWING = "following without obstacles, batch of 1,024, 1 core"
 ALONE = "one environment, `gym.make`"
 MUJOCO = "MuJoCo `mj_step`, 1 core"
 LIBRARIES = ("caster_gym", "gymnasium", "mujoco", "numba", "numpy")
@@ -53,8 +66,11 @@ print(time.perf_counter() - t)
 NOTES = """\
 A step of the environment is a control period of 20 ms: four RK4 steps, observation, reward, infos and, where an episode
 has ended, the reset. Actions are random, up to a tenth of the greatest torques, and the corridor is wide, so that
-episodes end by time. Bare RK4 is the equations alone at 5 ms; MuJoCo steps the same robot as rigid bodies at 2 ms, one
-robot at a time, many steps in a call. The engine alone skips Gymnasium's wrappers and the dictionary of infos. A fresh
+episodes end by time. Following is CasterFollow-v0 on random paths, with six pillars and walls drawn beside each.
+
+Bare RK4 is the equations alone at 5 ms, from random places and motions; the 8 obstacles are the walls of a room of
+4 m × 4 m and four pillars, off which the robots bounce. MuJoCo steps the same robot as rigid bodies at 2 ms, one robot
+at a time, many steps in a call. The engine alone skips Gymnasium's wrappers and the dictionary of infos. A fresh
 process counts from its first import to its first step, with the compiled code on disk. The load of an idle machine at
 the start is 0; at the end it is that of the measurement.
 """
@@ -87,11 +103,17 @@ def rate(call: Callable[[], int], seconds: float) -> float:
     return steps / passed
 
 
-def bare_equations(robot: Robot, count: int) -> Callable[[], int]:
-    """RK4 steps of a batch under random torques, from rest."""
-    fleet = Fleet(robot, count)
+def bare_equations(robot: Robot, count: int, arena: Arena | None = None) -> Callable[[], int]:
+    """RK4 steps of a batch under random torques, from random places and motions in the room, with its walls or not."""
+    fleet = Fleet(robot, count, around=None if arena is None else surroundings(robot, arena))
+    rng = np.random.default_rng(0)
+    poses = rng.uniform(-1.8, 1.8, (20 * count, 3))
+    free = poses[(distances(ROOM, robot, poses)[0] > 0.0).all(axis=1)][:count]
     start, steps = fleet.state, round(EXCERPT / RK4_STEP)
-    torques = ACTION * np.random.default_rng(0).uniform(-1.0, 1.0, (count, len(robot.joints))) * limits(robot)
+    start[:, :2] = free[:, :2]
+    start[:, 2], start[:, 3] = np.cos(free[:, 2]), np.sin(free[:, 2])
+    start[:, 4:7] = SPEED * rng.normal(size=(count, 3))
+    torques = ACTION * rng.uniform(-1.0, 1.0, (count, len(robot.joints))) * limits(robot)
 
     def call() -> int:
         fleet.state = start
@@ -106,9 +128,9 @@ def limits(robot: Robot) -> Any:
     return np.array([[caster.roll.max_torque, caster.steer.max_torque] for caster in robot.casters]).ravel()
 
 
-def batch(robot: str, count: int) -> Callable[[], int]:
+def batch(robot: str, count: int, name: str = ENVIRONMENT, **options: Any) -> Callable[[], int]:
     """Steps of the native batch, with observations, rewards, infos and resets."""
-    environment = gym.make_vec(ENVIRONMENT, num_envs=count, robot=robot, corridor=WIDE)
+    environment = gym.make_vec(name, num_envs=count, robot=robot, corridor=WIDE, **options)
     environment.reset(seed=0)
     shape = (BANK, *environment.action_space.shape)
     actions = np.random.default_rng(0).uniform(-ACTION, ACTION, shape).astype(np.float32)
@@ -197,11 +219,14 @@ def rows(robot: Robot, name: str, seconds: float) -> list[Row]:
     equations = bare_equations(robot, 4096)
     return [
         Row(EQUATIONS, "steps/s", on(1, equations), 3e6),
+        Row(AMONG, "steps/s", on(1, bare_equations(robot, 4096, ROOM))),
         Row(f"bare RK4, batch of 4,096, {cores} cores", "steps/s", on(cores, equations)),
         Row("environment, batch of 128, 1 core", "steps/s", on(1, batch(name, 128))),
         Row("environment, batch of 1,024, 1 core", "steps/s", on(1, batch(name, 1024))),
         Row(f"environment, batch of 1,024, {cores} cores", "steps/s", on(cores, batch(name, 1024)), 1e6),
         Row(f"environment, batch of 4,096, {cores} cores", "steps/s", on(cores, batch(name, 4096))),
+        Row(FREE_FOLLOWING, "steps/s", on(1, batch(name, 1024, FOLLOW, path=COURSES))),
+        Row(FOLLOWING, "steps/s", on(1, batch(name, 1024, FOLLOW, path=COURSES, arena={"beside": {}}))),
         Row(ALONE, "steps/s", on(1, single(ENVIRONMENT, ACTION, robot=name, corridor=WIDE)), 3e4),
         Row("one robot, engine alone, per step", "µs", each(bare_engine(name))),
         Row(MUJOCO, "steps/s", on(1, mujoco_steps(robot))),
@@ -221,6 +246,8 @@ def ratios(medians: dict[str, float]) -> list[tuple[str, str]]:
         ("simulated seconds per second, bare RK4 at 5 ms, 1 core", shown(RK4_STEP * rk4)),
         ("simulated seconds per second, MuJoCo at 2 ms, 1 core", shown(MUJOCO_STEP * mj)),
         ("one environment, `gym.make`, time of a step", f"{1e6 / alone:.1f} µs"),
+        ("bare RK4 among 8 obstacles over none, steps (goal: at least 0.5)", f"{medians[AMONG] / rk4:.2f}"),
+        ("following among 6 obstacles over none, steps", f"{medians[FOLLOWING] / medians[FREE_FOLLOWING]:.2f}"),
         ("bare RK4 over MuJoCo, steps", f"{rk4 / mj:.1f}"),
         ("bare RK4 over MuJoCo, simulated time", f"{RK4_STEP * rk4 / (MUJOCO_STEP * mj):.1f}"),
         ("batch of 1,024 over one environment, steps", f"{many / alone:.1f}"),

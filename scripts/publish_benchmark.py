@@ -6,16 +6,7 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = (
-    "table.md",
-    "summary.csv",
-    "run.yaml",
-    "overview.png",
-    "paths.png",
-    "errors.png",
-    "torques.png",
-    "learning.png",
-)
+FILES = ("table.md", "summary.csv", "run.yaml", "overview.png")  # and all other figures
 
 
 def publish(run: Path, name: str) -> None:
@@ -25,8 +16,8 @@ def publish(run: Path, name: str) -> None:
         raise SystemExit(f"{run} lacks {', '.join(missing)}; run `make benchmark` first")
     target = ROOT / "docs" / "benchmark" / name
     target.mkdir(parents=True, exist_ok=True)
-    for file in FILES:
-        shutil.copyfile(run / file, target / file)
+    for file in {run / name for name in FILES} | set(run.glob("*.png")):
+        shutil.copyfile(file, target / file.name)
     readme = ROOT / "README.md"
     begin, end = f"<!-- table {name}: begin -->\n", f"<!-- table {name}: end -->"
     between = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)

@@ -20,7 +20,8 @@ from caster_gym.agents.benchmark import (
 )
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.computed_torque import ComputedTorque
-from caster_gym.agents.evaluation import Metrics, measure, roll_out, test_batch
+from caster_gym.agents.evaluation import bare, roll_out, test_batch
+from caster_gym.agents.follow_metrics import FollowMetrics, FollowVerdict
 from caster_gym.agents.settings import (
     BenchmarkSettings,
     ComputedTorqueSettings,
@@ -28,6 +29,7 @@ from caster_gym.agents.settings import (
     read_agent,
     read_settings,
 )
+from caster_gym.agents.track_metrics import TrackMetrics, TrackVerdict, measure
 from caster_gym.agents.training import VALIDATION_SEED
 from caster_gym.configuration import ConfigurationError
 
@@ -97,7 +99,7 @@ def test_a_comparison_leaves_everything_behind(finished):
         ("computed torque", ""),
         *[("PPO", str(seed)) for seed in SEEDS],
     ]
-    assert len(rows(folder / "summary.csv")) == 2 * len(Metrics._fields)
+    assert len(rows(folder / "summary.csv")) == 2 * len(TrackMetrics._fields)
 
 
 def test_run_yaml_holds_what_the_comparison_was(finished, settings):
@@ -117,7 +119,7 @@ def test_every_seed_is_trained_for_itself(finished):
     seeds = [load_bundle(policy / "best").description.trained_with["seed"] for policy in policies]
     assert sorted(seeds) == SEEDS
     for policy in policies:
-        history = read_history(policy)
+        history = read_history(policy, TrackVerdict)
         assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
         assert history[-1].steps == 512
 
@@ -128,10 +130,10 @@ def test_episodes_can_be_measured_again_from_the_policies(finished, settings, ta
     batch = test_batch(task, task.test, STARTS)
     for policy in (file.parent for file in (folder / "policies").rglob("run.yaml")):
         bundle = load_bundle(policy / "best")
-        metrics = measure(roll_out(bundle.agent, batch, settings.start_seed), settings.settling, list(range(6)))
+        metrics = measure(roll_out(bundle.agent, batch, settings.start_seed), settings.settling)
         seed = str(bundle.description.trained_with["seed"])
         written = [row for row in rows(folder / "episodes.csv") if row["seed"] == seed]
-        for name in Metrics._fields:
+        for name in TrackMetrics._fields:
             assert_array_equal([float(row[name]) for row in written], getattr(metrics, name), name)
 
 
@@ -149,7 +151,7 @@ class Recorder:
 def test_all_agents_get_the_same_starts_and_paths(settings, task):
     batch = test_batch(task, task.test, STARTS)
     agents = [
-        Recorder(ComputedTorque(batch.engine.layout, frequency, batch.task.control_period), f"{frequency}")
+        Recorder(ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period), f"{frequency}")
         for frequency in (5.0, 10.0)
     ]
     results, shown = compare([Contender(agent.name, agent, None) for agent in agents], batch, settings)
@@ -166,13 +168,13 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
     listed = (3.0, 30.0, 1.0, 12.0)
     errors = {}
     for frequency in listed:
-        agent = ComputedTorque(batch.engine.layout, frequency, batch.task.control_period)
-        metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0, list(range(6)))
+        agent = ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period)
+        metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
         errors[frequency] = metrics.position_rmse.mean()
     settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
     agent, frequency = tune(settings, batch)
     assert frequency == min(errors, key=errors.get)
-    assert agent.gains == ComputedTorque(batch.engine.layout, frequency, batch.task.control_period).gains
+    assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
 
 
 def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
@@ -192,3 +194,42 @@ def test_an_unknown_agent_is_told_before_anything_is_trained(tmp_path, settings)
     with pytest.raises(ConfigurationError, match="there is no 'nobody' in agents; known are computed_torque"):
         run_benchmark(read_comparison(other), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_following_is_compared_in_the_same_way(tmp_path):
+    """One definition serves both tasks: another table, another figure, the same files."""
+    task = {
+        "environment": "follow",
+        "arena": {"beside": {"pillars": 1, "walls": 1}},
+        "shaping": [{"kind": "tolerance", "quantity": "heading_error", "margin": 0.5}],
+        **{
+            kind: [{"shape": "random_paths", "seed": seed, "count": 2, "reversing": 0.0, "min_radius": 0.3}]
+            for seed, kind in enumerate(("train", "validation", "test"))
+        },
+    }
+    controller = {"algorithm": "computed torque", "natural_frequencies": [10.0]}
+    settings = BenchmarkSettings(
+        task=write(tmp_path, "task", task),
+        agents=(write(tmp_path, "controller", controller), write(tmp_path, "ppo", PPO)),
+        seeds=(2,),
+    )
+    folder = tmp_path / "results"
+    text = run_benchmark(read_comparison(settings, {"steps": 512}), folder)
+    assert "time for the path [s]" in text
+    assert (folder / "speeds.png").read_bytes().startswith(b"\x89PNG")
+    controlled, learned = rows(folder / "episodes.csv")[::2]
+    assert list(controlled)[4:] == list(FollowMetrics._fields)
+    assert (controlled["finished"], controlled["failed"]) == ("1.0", "0.0")
+    assert learned["seed"] == "2"
+    policy = folder / "policies" / "ppo-2"
+    history = read_history(policy, FollowVerdict)
+    assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
+    best = load_bundle(policy / "best").description
+    assert (best.environment, best.wrappers, best.actions) == ("follow", (), 6)
+
+
+def test_computed_torque_is_refused_where_actions_are_no_torques(task):
+    commanded = TaskSettings.model_validate({**task.model_dump(), "wrappers": ["twist_commands"]})
+    settings = ComputedTorqueSettings(algorithm="computed torque")
+    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* those of TwistCommands"):
+        tune(settings, test_batch(commanded, commanded.validation, starts=1))

@@ -17,21 +17,25 @@ from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.settings import PPOSettings, SACSettings
 from caster_gym.agents.training import actor_of, make_learner
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+from caster_gym.envs.caster_track import CasterTrackVectorEnv
+from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import load_robot
+from caster_gym.wrappers import MotorLag, TwistCommands
 
 ROBOT = load_robot("chung2008")
 TASK = TrackTask(corridor=0.4)
 LAYOUT = ObservationLayout(ROBOT, TASK.preview)
+FOLLOWED = ObservationLayout(ROBOT, FollowTask().preview, "m", FollowTask().nearest)
 HIDDEN = (16, 8)
 
 
-def fresh_bundle(seed=0, squash="clip"):
+def fresh_bundle(seed=0, squash="clip", actions=6, **told):
     """A policy with random weights, some of whose actions leave −1 … 1 before they are bounded."""
     torch.manual_seed(seed)
-    actor = Actor(LAYOUT.size, HIDDEN, 6, squash)
+    layout = FOLLOWED if told.get("environment") == "follow" else LAYOUT
+    actor = Actor(layout.size, HIDDEN, actions, squash)
     with torch.no_grad():
         actor.head.weight *= 30.0
     description = PolicyDescription(
@@ -40,7 +44,8 @@ def fresh_bundle(seed=0, squash="clip"):
         squash=squash,
         hidden=HIDDEN,
         robot=ROBOT,
-        task=TASK,
+        actions=actions,
+        **{"task": TASK, **told},
         trained_with={"seed": seed, "settings": {"learning_rate": 3e-4}},
         versions={"numpy": np.__version__},
     )
@@ -174,6 +179,15 @@ def test_a_missing_file_is_named(tmp_path):
         load_bundle(folder)
 
 
+def test_a_policy_without_a_task_is_refused(tmp_path):
+    folder = saved(tmp_path)
+    content = yaml.safe_load((folder / DESCRIPTION).read_text(encoding="utf-8"))
+    del content["task"]
+    (folder / DESCRIPTION).write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"policy\.yaml: 'task' is missing"):
+        load_bundle(folder)
+
+
 @pytest.mark.parametrize("version", [2, 0, "1", None, True, [1]])
 def test_another_format_is_refused(tmp_path, version):
     folder = saved(tmp_path)
@@ -255,3 +269,40 @@ def test_a_policy_is_refused_where_it_cannot_act():
         bundle.check_fits(ObservationLayout(ROBOT, (0.1,)), TASK.control_period)
     with pytest.raises(ValueError, match=r"acts every 0\.02 s, the task every 0\.01 s"):
         bundle.check_fits(LAYOUT, 0.01)
+    with pytest.raises(ValueError, match="the policy sees 0 obstacles, the task shows 3"):
+        bundle.check_fits(ObservationLayout(ROBOT, TASK.preview, "s", 3), TASK.control_period)
+
+
+def test_a_policy_is_refused_in_the_other_environment():
+    tracks, follows = fresh_bundle(), fresh_bundle(environment="follow", task=FollowTask())
+    layout = follows.description.layout
+    follows.check_fits(layout, TASK.control_period)
+    assert layout.size == FOLLOWED.size
+    with pytest.raises(
+        ValueError, match=r"learned to follow a timetable .*'track'.*, the task is to .* at its own pace"
+    ):
+        tracks.check_fits(layout, TASK.control_period)
+    with pytest.raises(ValueError, match=r"learned to follow a path at its own pace .*, the task is to .* a timetable"):
+        follows.check_fits(LAYOUT, TASK.control_period)
+
+
+def test_a_policy_is_refused_where_its_actions_mean_something_else():
+    """What only changes sensors or the plant may differ: a policy can be tried with it."""
+    commands, lag = TwistCommands(), MotorLag()
+    bundle = fresh_bundle(wrappers=(commands, lag))
+    bundle.check_fits(LAYOUT, TASK.control_period, [commands])
+    fresh_bundle().check_fits(LAYOUT, TASK.control_period, [lag])
+    with pytest.raises(ValueError, match=r"the policy's actions are TwistCommands\(.*\), the task takes torques"):
+        bundle.check_fits(LAYOUT, TASK.control_period)
+    with pytest.raises(ValueError, match=r"the policy's actions are torques, the task takes TwistCommands\("):
+        fresh_bundle().check_fits(LAYOUT, TASK.control_period, [commands])
+
+
+def test_a_policy_with_features_is_read_back(tmp_path):
+    """Here three speeds of the platform instead of six torques."""
+    before = fresh_bundle(wrappers=(TwistCommands(),), actions=3)
+    save_bundle(tmp_path / "policy", before)
+    after = load_bundle(tmp_path / "policy")
+    assert after.description == before.description
+    assert after.agent.act(observations(4)).shape == (4, 3)
+    assert_array_equal(after.agent.act(observations()), before.agent.act(observations()))

@@ -56,7 +56,7 @@ def test_each_command_explains_itself(call, command):
         (["evaluate", "nobody"], "there is no 'nobody' in agents"),
         (["evaluate", "ppo"], "agent 'ppo' must be trained first"),
         (["evaluate", "computed_torque", "--task", "nowhere"], "there is no 'nowhere' in tasks"),
-        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are track"),
+        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, track"),
         (["train", "--set", "steps"], "--set needs KEY=VALUE, got 'steps'"),
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (["train", "--set", "stepz=3"], "did you mean 'steps'?"),
@@ -162,6 +162,15 @@ def test_model_based_control_is_evaluated_by_name(call):
     assert result.exit_code == 0, result.output
     assert "computed torque" in result.stdout
     assert "0 of 2" in result.stdout
+
+
+def test_a_policy_is_not_evaluated_in_the_other_environment(call, tmp_path):
+    other = {kind: [{"shape": "circle", "radius": 0.5 + i}] for i, kind in enumerate(TASK)}
+    (tmp_path / "other.yaml").write_text(yaml.safe_dump({"environment": "follow", **other}), encoding="utf-8")
+    assert call("train", "ppo", *TINY, "--task", "task.yaml", "--out", "run").exit_code == 0
+    result = call("evaluate", "run/best", "--task", "other.yaml", "--out", "results")
+    assert_refused(result, "the policy has learned to follow a timetable")
+    assert not (tmp_path / "results").exists()
 
 
 def test_ctrl_c_ends_quietly_and_keeps_what_was_learned(call, tmp_path, monkeypatch):

@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.agents.computed_torque import ComputedTorque, gains, known_model
-from caster_gym.agents.evaluation import measure, roll_out
+from caster_gym.agents.evaluation import roll_out
+from caster_gym.agents.track_metrics import measure
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.engines.numpy_model import Model
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import load_robot
 
@@ -23,10 +24,6 @@ FAST = {"shape": "random_paths", "seed": 3, "count": COUNT, "duration": 5.0, "ma
 def make(robot="chung2008", path=PATHS, known="exact", frequency=FREQUENCY, actuation=None, **task):
     batch = CasterTrackVectorEnv(COUNT, robot=robot, path=path, actuation=actuation, **task)
     return batch, ComputedTorque(batch.engine.layout, frequency, batch.task.control_period, known)
-
-
-def driven(batch):
-    return [batch.robot.joints.index(joint) for joint in batch.robot.driven]
 
 
 def errors_in_the_world(batch, observations, info):
@@ -108,7 +105,7 @@ def test_the_more_a_controller_knows_the_better_it_tracks():
     errors = []
     for known in ("exact", "without D1", "without wheels"):
         batch, agent = make(path=FAST, known=known)
-        metrics = measure(roll_out(agent, batch, seed=5), 2.0, driven(batch))
+        metrics = measure(roll_out(agent, batch, seed=5), 2.0)
         assert metrics.failed.sum() == 0
         errors.append(np.sqrt(np.mean(metrics.position_rmse**2)))
     exact, without_d1, without_wheels = errors
@@ -171,7 +168,7 @@ def test_robots_with_coupled_motors_track(robot):
     """
     batch, agent = make(robot)
     assert any(caster.gear != ((1.0, 0.0), (0.0, 1.0)) for caster in batch.robot.casters)
-    metrics = measure(roll_out(agent, batch, seed=5), 2.0, driven(batch))
+    metrics = measure(roll_out(agent, batch, seed=5), 2.0)
     assert metrics.failed.sum() == 0
     assert metrics.worst_position.max() < 2e-3
     assert metrics.position_rmse.mean() < 4e-4
@@ -182,7 +179,7 @@ def test_two_casters_with_both_motors_are_enough():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ActuationWarning)
         batch, agent = make(actuation=["roll_1", "steer_1", "roll_2", "steer_2"])
-    metrics = measure(roll_out(agent, batch, seed=5), 2.0, driven(batch))
+    metrics = measure(roll_out(agent, batch, seed=5), 2.0)
     assert metrics.failed.sum() == 0
     assert metrics.worst_position.max() < 1e-3
 

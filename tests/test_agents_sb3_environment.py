@@ -14,8 +14,8 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from caster_gym.agents.sb3_environment import CasterVecEnv
-from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.caster_track_vector import CasterTrackVectorEnv
+from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.wrappers import Tolerance, wrap
 
 TASK = {"corridor": 0.08, "path": {"shape": "circle", "radius": 0.5}}  # starts lie up to 0.07 m from the path
 LONGEST = 30
@@ -214,3 +214,22 @@ def test_robots_of_a_batch_have_nothing_of_their_own():
         env.set_attr("task", None)
     with pytest.raises(AttributeError, match="'reset' cannot be called"):
         env.env_method("reset")
+
+
+def test_what_features_add_is_learned_from():
+    """Rewards are shaped, and so are the returns that are told; attributes are still those of the batch."""
+    bonus = Tolerance(quantity="position_error", margin=1.0, weight=10.0)
+    plain = native(longest=4)
+    shaped = CasterVecEnv(wrap(native(longest=4).batch, bonus))
+    assert shaped.get_attr("task") == plain.get_attr("task")
+    assert shaped.actions == plain.actions == 6
+    for env in (plain, shaped):
+        env.seed(5)
+        env.reset()
+    rest = np.zeros((COUNT, 6), dtype=np.float32)
+    sums = np.zeros((2, COUNT))
+    for _ in range(4):
+        told = [env.step(rest) for env in (plain, shaped)]
+        sums += [step[1] for step in told]
+    assert (sums[1] > sums[0] + 4 * 8.0).all()  # a gaussian of at most 7 cm over 1 m is worth over 0.98
+    assert [info["episode"]["r"] for info in told[1][3]] == pytest.approx(sums[1].tolist(), rel=1e-6)

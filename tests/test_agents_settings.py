@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from gymnasium.vector import AutoresetMode
 
+from caster_gym.agents.evaluation import bare, make_batch
 from caster_gym.agents.settings import (
     BenchmarkSettings,
     ComputedTorqueSettings,
@@ -17,8 +19,8 @@ from caster_gym.agents.settings import (
     read_settings,
 )
 from caster_gym.configuration import ConfigurationError, parse
-from caster_gym.paths.specification import build_trajectories
-from caster_gym.robot import load_robot
+from caster_gym.envs.follow_task import FollowTask
+from caster_gym.envs.track_task import TrackTask
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {
@@ -46,9 +48,8 @@ def test_each_agent_that_comes_with_the_package_loads(name):
 @pytest.mark.parametrize("name", names("tasks"))
 def test_each_task_that_comes_with_the_package_loads(name):
     task = read_settings(TaskSettings, "tasks", name)
-    robot = load_robot(task.robot)
     for paths in (task.train, task.validation, task.test):
-        assert build_trajectories(paths, robot, task.task.control_period)
+        assert bare(make_batch(task, paths, 1, AutoresetMode.NEXT_STEP)).engine.plan.names
 
 
 @pytest.mark.parametrize("name", names("benchmarks"))
@@ -142,6 +143,56 @@ def test_what_is_wrong_with_a_task_is_named():
         parse(TaskSettings, {**PATHS, "train": []}, "task")
     with pytest.raises(ConfigurationError, match=r"unknown key 'task\.coridor'; did you mean 'corridor'\?"):
         parse(TaskSettings, {**PATHS, "task": {"coridor": 1.0}}, "task")
+
+
+def test_an_environment_has_tasks_of_its_own():
+    assert parse(TaskSettings, PATHS, "task").task == TrackTask()
+    following = parse(TaskSettings, {**PATHS, "environment": "follow", "task": {"speed_limit": 0.5}}, "task")
+    assert following.task == FollowTask(speed_limit=0.5)
+    assert parse(TaskSettings, {**PATHS, "environment": "follow"}, "task").task == FollowTask()
+    assert parse(TaskSettings, following.model_dump(mode="json"), "task") == following
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"environment": "flow"}, "task: 'environment' should be 'track' or 'follow', got 'flow'$"),
+        ({"task": {"speed_limit": 1.0}}, "'speed_limit' is for environment 'follow', got it with environment 'track'"),
+        (
+            {"environment": "follow", "task": {"position_weight": 1.0}},
+            "'position_weight' is for environment 'track', got it with environment 'follow'",
+        ),
+        (
+            {"environment": "follow", "task": TrackTask()},
+            "must be a FollowTask in environment 'follow', got a TrackTask",
+        ),
+        ({"environment": "follow", "task": {"speed_limt": 1.0}}, r"'task\.speed_limt'; did you mean 'speed_limit'\?"),
+        ({"environment": "follow", "task": {"speed_limit": 0}}, r"'task\.speed_limit' should be greater than 0, got 0"),
+        ({"arena": {"beside": {"pillar": 3}}}, r"'arena\.beside\.pillar'; did you mean 'pillars'\?"),
+        ({"arena": "nowhere.yaml"}, "'arena': there is no file 'nowhere.yaml'"),
+        ({"wrappers": ["motorlag"]}, r"unknown kind 'motorlag'; did you mean 'motor_lag'\?"),
+        ({"wrappers": "motor_lag"}, "'wrappers' should be a list"),
+        ({"shaping": ["payload"]}, "unknown kind 'payload'; known are effort, impact, potential"),
+        ({"shaping": [{"kind": "effort", "weigth": 1.0}]}, r"unknown key 'weigth'; did you mean 'weight'\?"),
+    ],
+)
+def test_what_does_not_fit_an_environment_is_named(content, message):
+    with pytest.raises(ConfigurationError, match=message):
+        parse(TaskSettings, {**PATHS, **content}, "task")
+
+
+def test_features_may_be_written_by_their_kind_alone():
+    short, long = (
+        parse(TaskSettings, {**PATHS, "wrappers": [lag], "shaping": ["effort"]}, "task")
+        for lag in ("motor_lag", {"kind": "motor_lag"})
+    )
+    assert short == long
+
+
+def test_an_arena_may_be_a_file(tmp_path):
+    name = written(tmp_path, {"pillars": [{"centre": [1.0, 2.0]}]})
+    assert parse(TaskSettings, {**PATHS, "arena": name}, "task").arena.pillars[0].centre == (1.0, 2.0)
+    assert parse(TaskSettings, {**PATHS, "arena": None}, "task") == parse(TaskSettings, PATHS, "task")
 
 
 @pytest.mark.parametrize("kind", ["agents", "tasks", "benchmarks"])

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.agents.evaluation import Metrics
+from caster_gym.agents.follow_metrics import FollowMetrics
+from caster_gym.agents.measuring import Counted, Printed, shown
 from caster_gym.agents.summary import (
-    ROWS,
     Estimate,
     Result,
     by_agent,
@@ -19,6 +19,7 @@ from caster_gym.agents.summary import (
     write_episodes,
     write_summary,
 )
+from caster_gym.agents.track_metrics import TrackMetrics
 
 EPISODES = 4
 
@@ -26,10 +27,11 @@ EPISODES = 4
 def result(agent, seed, offset=0.0, failed=(0, 0, 0, 0)):
     """Metrics whose numbers differ from field to field and from episode to episode."""
     fields = {
-        name: offset + 0.1 * k + 0.01 * np.arange(EPISODES, dtype=np.float64) for k, name in enumerate(Metrics._fields)
+        name: offset + 0.1 * k + 0.01 * np.arange(EPISODES, dtype=np.float64)
+        for k, name in enumerate(TrackMetrics._fields)
     }
     fields["failed"] = np.array(failed, dtype=np.float64)
-    return Result(agent, seed, ("circle", "random_paths 0", "random_paths 1", "circle"), Metrics(**fields))
+    return Result(agent, seed, ("circle", "random_paths 0", "random_paths 1", "circle"), TrackMetrics(**fields))
 
 
 RESULTS = [
@@ -127,11 +129,12 @@ def test_the_table_says_what_the_episodes_say():
     assert cells(head)[1:] == ["computed torque", "PPO, 2 seeds"]
     assert set(rule) == {"|", "-", " "}
     assert len({len(line) for line in (head, rule, *lines)}) == 1  # columns stand below one another
-    assert [cells(line)[0] for line in lines] == [*[row.title for row in ROWS], "failures"]
+    assert [cells(line)[0] for line in lines] == [how.label for _, how in shown(TrackMetrics)]
     assert cells(lines[-1])[1:] == ["0 of 4", "3 of 8"]
-    for row, line in zip(ROWS, lines, strict=False):
+    printed = [(name, how) for name, how in shown(TrackMetrics) if isinstance(how, Printed)]
+    for (name, how), line in zip(printed, lines, strict=False):
         for cell, group in zip(cells(line)[1:], (RESULTS[:1], RESULTS[1:]), strict=True):
-            values = row.factor * np.array([getattr(one.metrics, row.metric) for one in group])
+            values = how.factor * np.array([getattr(one.metrics, name) for one in group])
             mean, low, high = (float(number) for number in re.findall(r"[-\d.e+]+", cell)[:3])
             assert mean == pytest.approx(values.mean(), rel=5e-3)  # three digits are printed
             assert low <= mean <= high
@@ -140,9 +143,25 @@ def test_the_table_says_what_the_episodes_say():
         assert (float(low), float(high)) == pytest.approx((means.min(), means.max()), rel=5e-3)
 
 
-def test_units_of_the_table_are_those_it_prints():
-    factors = {row.title.split("[")[1].rstrip("]").split()[0]: row.factor for row in ROWS}
-    assert factors == {"mm": 1e3, "mrad": 1e3, "%": 1e2, "N": 1.0, "1/s": 1.0}
+@pytest.mark.parametrize("metrics", [TrackMetrics, FollowMetrics])
+def test_units_of_the_table_are_those_it_prints(metrics):
+    factors = {"mm": 1e3, "mrad": 1e3, "%": 1e2, "% of limits squared": 1e2}
+    for _, how in shown(metrics):
+        if isinstance(how, Printed):
+            assert how.factor == factors.get(how.unit, 1.0)
+
+
+def test_each_kind_of_metrics_has_a_table():
+    values = {name: np.array([0.5, 0.25]) for name in FollowMetrics._fields}
+    values["lap_time"] = np.full(2, np.nan)
+    values["finished"] = np.array([0.0, 1.0])
+    lines = table([Result("PPO", 0, ("circle", "ellipse"), FollowMetrics(**values))], 0.95).splitlines()
+    found = {cells(line)[0]: cells(line)[1] for line in lines[2:]}
+    assert list(found) == [how.label for _, how in shown(FollowMetrics)]
+    assert found["finished"] == "1 of 2"
+    assert found["time for the path [s]"] == "–"  # nobody has one
+    assert found["cross-track RMSE [mm]"].startswith("375 [")
+    assert sum(isinstance(how, Counted) for _, how in shown(FollowMetrics)) == 2
 
 
 def test_one_run_is_no_range():
@@ -156,12 +175,12 @@ def test_every_episode_is_written(tmp_path):
     write_episodes(tmp_path / "episodes.csv", RESULTS)
     written = rows(tmp_path / "episodes.csv")
     assert len(written) == len(RESULTS) * EPISODES
-    assert list(written[0]) == ["agent", "seed", "episode", "path", *Metrics._fields]
+    assert list(written[0]) == ["agent", "seed", "episode", "path", *TrackMetrics._fields]
     for k, row in enumerate(written):
         one, episode = RESULTS[k // EPISODES], k % EPISODES
         assert (row["agent"], row["path"], int(row["episode"])) == (one.agent, one.paths[episode], episode)
         assert row["seed"] == ("" if one.seed is None else str(one.seed))
-        for name in Metrics._fields:
+        for name in TrackMetrics._fields:
             assert float(row[name]) == getattr(one.metrics, name)[episode]  # to the last bit
 
 
@@ -177,7 +196,7 @@ def test_the_summary_holds_an_estimate_of_every_metric(tmp_path):
     write_summary(tmp_path / "summary.csv", RESULTS, 0.95)
     written = rows(tmp_path / "summary.csv")
     assert [(row["agent"], row["metric"]) for row in written] == [
-        (agent, metric) for agent in ("computed torque", "PPO") for metric in Metrics._fields
+        (agent, metric) for agent in ("computed torque", "PPO") for metric in TrackMetrics._fields
     ]
     for row in written:
         group = [one for one in RESULTS if one.agent == row["agent"]]
