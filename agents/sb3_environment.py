@@ -101,7 +101,7 @@ class CasterVecEnv(VecEnv):
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         """One picture of the first robots in a grid, or None where the batch draws none."""
-        return [self.batch.render() if self.render_mode == "rgb_array" else None]
+        return [bare(self.batch).render() if self.render_mode == "rgb_array" else None]
 
     def _get_indices(self, indices: VecEnvIndices) -> Iterable[int]:
         return super()._get_indices(indices)

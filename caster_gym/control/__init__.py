@@ -1,0 +1,1 @@
+"""How to make the robot move as wanted: torques for wrenches."""
