@@ -153,6 +153,21 @@ def tune(settings: ComputedTorqueSettings, validation: Batch) -> tuple[ComputedT
     return best[1], best[2]
 
 
+def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
+    """A trained policy from its folder, or model-based control, tuned on validation paths, by its name.
+
+    Raises ValueError for a policy that does not fit the batch, and for an agent that must be trained first.
+    """
+    if Path(name).is_dir():
+        bundle, plain = load_bundle(Path(name)), bare(batch)
+        bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
+        return bundle.agent
+    known = read_agent(name)
+    if not isinstance(known, ComputedTorqueSettings):
+        raise ValueError(f"agent {name!r} must be trained first: give the folder of its policy")
+    return tune(known, test_batch(settings, settings.validation, starts=1))[0]
+
+
 def train_all(jobs: Sequence[Job]) -> None:
     """Train all jobs, one per core at a time, with one progress bar over all their steps.
 

@@ -80,8 +80,7 @@ def evaluate(
 ) -> None:
     """Try an agent on the test paths of a task: a table, every episode as CSV, and figures."""
     with _plain_errors():
-        from .benchmark import Contender, compare, tune
-        from .bundle import load_bundle
+        from .benchmark import Contender, compare, ready_agent
         from .evaluation import bare, test_batch
         from .figures import write_figures
         from .provenance import write_provenance
@@ -90,24 +89,15 @@ def evaluate(
         tasks = read_settings(TaskSettings, "tasks", task)
         settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
         test = test_batch(tasks, tasks.test, starts)
-        plain = bare(test)
-        if Path(policy).is_dir():
-            bundle = load_bundle(Path(policy))
-            bundle.check_fits(plain.engine.layout, plain.task.control_period, tasks.wrappers)
-            contender = Contender(bundle.agent.name, bundle.agent, None)
-        else:
-            known = read_agent(policy)
-            if not isinstance(known, ComputedTorqueSettings):
-                raise ValueError(f"agent {policy!r} must be trained first: give the folder of its policy")
-            controller, _ = tune(known, test_batch(tasks, tasks.validation, starts=1))
-            contender = Contender(controller.name, controller, None)
+        agent = ready_agent(policy, tasks, test)
+        contender = Contender(agent.name, agent, None)
         _prepare(out, overwrite, kept=Path(policy))
         results, episodes = compare([contender], test, settings)
         text = table(results, settings.confidence)
         write_episodes(out / "episodes.csv", results)
         write_summary(out / "summary.csv", results, settings.confidence)
         (out / "table.md").write_text(text + "\n", encoding="utf-8")
-        write_figures(out, episodes, {}, plain.engine.plan)
+        write_figures(out, episodes, {}, bare(test).engine.plan)
         write_provenance(out, policy=policy, task=tasks.model_dump(mode="json"), starts=starts)
         typer.echo(text)
         typer.echo(f"Results and figures are in {out}.")

@@ -15,11 +15,11 @@ from caster_gym.render.recording import check_target, recording
 from caster_gym.render.view import reach
 from caster_gym.render.viewer import MOST, SIZE, Viewer, has_display
 
-from .benchmark import tune
-from .evaluation import Batch, bare, make_batch, test_batch
+from .benchmark import ready_agent
+from .evaluation import Batch, bare, make_batch
 from .keyboard import KeyboardDriver, keys_of_window
 from .protocol import Agent
-from .settings import ComputedTorqueSettings, TaskSettings, read_agent, read_settings
+from .settings import TaskSettings, read_settings
 
 KEYBOARD = "keyboard"
 FREE = 1e3  # [m] corridor of a person who drives
@@ -93,21 +93,6 @@ def _check(driving: bool, robots: int, seconds: float | None) -> None:
         raise ValueError(f"robots must be 1{'' if driving else f' … {MOST}'}, got {robots}")
     if seconds is not None and not seconds > 0.0:
         raise ValueError(f"seconds must be positive, got {seconds}")
-
-
-def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
-    """A trained policy from its folder, or model-based control tuned on validation paths by its name."""
-    if Path(name).is_dir():
-        from .bundle import load_bundle
-
-        bundle = load_bundle(Path(name))
-        plain = bare(batch)
-        bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
-        return bundle.agent
-    known = read_agent(name)
-    if not isinstance(known, ComputedTorqueSettings):
-        raise ValueError(f"agent {name!r} must be trained first: give the folder of its policy")
-    return tune(known, test_batch(settings, settings.validation, starts=1))[0]
 
 
 def _batch(settings: TaskSettings, robots: int) -> Batch:

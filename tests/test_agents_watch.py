@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
 from caster_gym.agents import watch as module
+from caster_gym.agents.benchmark import ready_agent
 from caster_gym.agents.keyboard import KEYS, KeyboardDriver, greatest_twist, keys_of_window, wanted_shares
 from caster_gym.agents.watch import watch
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
@@ -71,7 +72,7 @@ def test_several_robots_are_shown_until_the_last_has_ended(setup):
     """The circle takes longer than the random paths; their robots stay where they ended."""
     settings = module.read_settings(module.TaskSettings, "tasks", "task.yaml")
     batch = module._batch(settings, 3)
-    agent = module.ready_agent("agent.yaml", settings, batch)
+    agent = ready_agent("agent.yaml", settings, batch)
     shown = list(module._scenes(agent, batch, np.arange(3), seed=0, once=True))
     times = np.array([[scene.time for scene in scenes] for scenes in shown])
     assert_allclose(times[STEPS], STEPS * 0.02)

@@ -144,7 +144,7 @@ def test_terms_stay_in_their_ranges():
         terms = follow_terms(errors, share, effort, pressing)
         assert 0.0 <= terms.progress <= 0.2
         assert 0.0 <= terms.cross_track <= 0.4
-        assert 0.0 <= terms.heading <= 0.2
+        assert 0.0 <= terms.heading <= 0.4
         assert -0.02 <= terms.effort <= 0.0
         assert -0.5 <= terms.impact <= 0.0
         assert terms.alive == 0.52

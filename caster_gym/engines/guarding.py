@@ -2,13 +2,12 @@
 
 Each lane keeps its room: a lower bound on the gap to the nearest obstacle. A step that certainly uses up less than the
 room is an ordinary one, so that robots in the open keep their speed; only the others measure gaps. Where there are no
-obstacles at all, they are None to the compiler, which then leaves out everything that minds them.
+obstacles at all, they are None, and the compiler leaves out everything that minds them.
 """
 
 from typing import Any
 
-from numba import types
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 
 from caster_gym.engines.numba_compiler import INLINE, borrowed
 from caster_gym.mechanics.integration import pack_state
@@ -31,45 +30,35 @@ def worth_measuring(room: Scalar, v: Vector, h: Scalar, reach: Scalar) -> Any:
     return room < CLOSE + _WORTHWHILE * h * speed_bound(v, reach)
 
 
-def settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, reach: Any) -> Any:
+@register_jitable(**INLINE)
+def settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, hull: Any) -> Any:
     """Where a robot is after an ordinary step that would lead to `end`: its packed state, its room, and 1 if it went.
 
     A robot that may touch something stays where it is, with a room of −1; its step is to be taken with care. The way of
     every point is bounded by the sum of both ends' speeds, twice their mean.
     """
-    raise NotImplementedError
-
-
-@overload(settled, jit_options=INLINE, strict=False)
-def _settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, reach: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda obstacles, room, state, end, h, reach: (pack_state(end), room, 1.0)
-
-    def among(obstacles: Any, room: Any, state: Any, end: Any, h: Any, reach: Any) -> Any:
-        left = room - h * (speed_bound(state.twist, reach) + speed_bound(end.twist, reach))
-        risky = left < CLOSE
-        stays = each(where, (risky,), pack_state(state), pack_state(end))
-        return stays, where(risky, -1.0, left), where(risky, 0.0, 1.0)
-
-    return among
+    if obstacles is None:
+        return pack_state(end), room, 1.0
+    left = room - h * (speed_bound(state.twist, hull.reach) + speed_bound(end.twist, hull.reach))
+    risky = left < CLOSE
+    stays = each(where, (risky,), pack_state(state), pack_state(end))
+    return stays, where(risky, -1.0, left), where(risky, 0.0, 1.0)
 
 
 @register_jitable(**INLINE)
-def borrowed_hull(hull: Hull) -> Hull:
-    """The hull with its arrays borrowed."""
+def borrowed_hull(hull: Any) -> Any:
+    """The hull, if it is needed, with its arrays borrowed."""
+    if hull is None:
+        return None
     return Hull(borrowed(hull.faces), borrowed(hull.corners), hull.radius, hull.reach)
 
 
+@register_jitable(**INLINE)
 def borrowed_obstacles(obstacles: Any) -> Any:
-    """The obstacles with their arrays borrowed."""
-    raise NotImplementedError
-
-
-@overload(borrowed_obstacles, jit_options=INLINE, strict=False)
-def _borrowed_obstacles(obstacles: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda obstacles: None
-    return lambda obstacles: Obstacles(
+    """The obstacles, if any, with their arrays borrowed."""
+    if obstacles is None:
+        return None
+    return Obstacles(
         borrowed(obstacles.faces),
         borrowed(obstacles.corners),
         borrowed(obstacles.radii),

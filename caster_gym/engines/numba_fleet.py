@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
@@ -26,7 +25,7 @@ from caster_gym.engines.threads import over_blocks
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import pack_state, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, pack_parameters, robot_parameters
-from caster_gym.mechanics.separation import NO_HULL, Hull, Obstacles, Surroundings, clearance
+from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance
 from caster_gym.robot import Robot
 
 
@@ -43,6 +42,29 @@ def room_row(casters: Any) -> int:
 
 
 @register_jitable(**INLINE)
+def _measure(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+    """Measure the room of robots that may soon need to know it."""
+    if obstacles is None:
+        return
+    row = room_row(casters)
+    for lane in range(lanes):
+        state = read_state(block, lane, 0, casters)
+        if worth_measuring(block[row * LANES + lane], state.twist, h, hull.reach):
+            gap = clearance(state.position, state.heading, hull, obstacles, 0, len(obstacles.radii))
+            block[row * LANES + lane] = gap
+
+
+@register_jitable(**INLINE)
+def _take_care(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
+    """Step the robots that may touch something."""
+    if obstacles is None:
+        return
+    for lane in range(lanes):
+        if block[room_row(casters) * LANES + lane] < 0.0:
+            _compiled_careful_step(block, lane, h, hull, obstacles, casters)
+
+
+@register_jitable(**INLINE)
 def _step_lanes(block: Any, lanes: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
     """One RK4 step of the first robots of one block."""
     row = room_row(casters)
@@ -52,49 +74,10 @@ def _step_lanes(block: Any, lanes: int, h: float, hull: Hull, obstacles: Any, ca
         torques = read_pairs(block, lane, torque_row(casters), casters)
         robot = read_robot(block, lane, row + 1, casters)
         target = rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)
-        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, hull.reach)
+        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, hull)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
     _take_care(block, lanes, h, hull, obstacles, casters)
-
-
-def _measure(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
-    """Measure the room of robots that may soon need to know it."""
-    raise NotImplementedError
-
-
-def _take_care(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
-    """Step the robots that may touch something."""
-    raise NotImplementedError
-
-
-@overload(_measure, jit_options=INLINE, strict=False)
-def _measure_compiled(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda block, lanes, h, hull, obstacles, casters: None
-
-    def among(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
-        row = room_row(casters)
-        for lane in range(lanes):
-            state = read_state(block, lane, 0, casters)
-            if worth_measuring(block[row * LANES + lane], state.twist, h, hull.reach):
-                gap = clearance(state.position, state.heading, hull, obstacles, 0, len(obstacles.radii))
-                block[row * LANES + lane] = gap
-
-    return among
-
-
-@overload(_take_care, jit_options=INLINE, strict=False)
-def _take_care_compiled(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda block, lanes, h, hull, obstacles, casters: None
-
-    def among(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters: Any) -> None:
-        for lane in range(lanes):
-            if block[room_row(casters) * LANES + lane] < 0.0:
-                _compiled_careful_step(block, lane, h, hull, obstacles, casters)
-
-    return among
 
 
 def _careful_step(block: Any, lane: int, h: float, hull: Hull, obstacles: Obstacles, casters: tuple[int, ...]) -> None:
@@ -159,8 +142,9 @@ class Fleet:
         self.count = len(listed)
         self._casters = tuple(range(sizes.pop()))
         self._torque_row, self._room_row = torque_row(self._casters), room_row(self._casters)
-        self._hull = NO_HULL if around is None else around.hull
-        self._obstacles = None if around is None or len(around.obstacles.radii) == 0 else around.obstacles
+        among = around is not None and len(around.obstacles.radii) > 0
+        self._hull: Hull | None = around.hull if around is not None and among else None
+        self._obstacles: Obstacles | None = around.obstacles if around is not None and among else None
         self._distinct = list({id(robot): robot for robot in listed}.values())
         packed = {id(robot): pack_parameters(robot_parameters(robot, dynamics)) for robot in self._distinct}
         parameters = np.array([packed[id(robot)] for robot in listed])

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload, register_jitable
 
-from caster_gym.engines.lanes import LANES, write
+from caster_gym.engines.lanes import LANES, counting, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, teach
 from caster_gym.envs import following, tracking
 from caster_gym.envs.following import (
@@ -22,10 +22,13 @@ from caster_gym.envs.following import (
 )
 from caster_gym.envs.tracking import Endings, Reference, Weights, endings, mean_effort, reward_terms, tracking_errors
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import maximum, minimum
+from caster_gym.mechanics.scalars import each, maximum, minimum
 
 REFERENCE_ROWS = len(Reference._fields)
 POINT_ROWS = 7
+
+_WEIGHTS = (0.0,) * len(Weights._fields)
+_FOLLOW_WEIGHTS = (0.0,) * len(FollowWeights._fields)
 
 teach(tracking)
 teach(following)
@@ -37,7 +40,7 @@ class Timetable(NamedTuple):
     samples: Any  # float64 (rows of all trajectories, 10), as in caster_gym.paths.trajectory
     spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
     horizons: Any  # int64 (previewed points,): control periods ahead
-    weights: Weights
+    weights: Any  # float64 (weights,), as in Weights: taken apart in every call, an array costs less than its numbers
 
 
 class Courses(NamedTuple):
@@ -52,12 +55,12 @@ class Courses(NamedTuple):
     arrival: Any  # [m] before its end, a path counts as done
     arrival_scale: Any  # [m] distance from the end that halves what staying there is worth
     free_heading: Any  # 1 if the heading is free, else 0
-    weights: FollowWeights
+    weights: Any  # float64 (weights,), as in FollowWeights
 
 
 def borrowed_guide(guide: Any) -> Any:
-    """The guide with its arrays borrowed."""
-    raise NotImplementedError
+    """The guide with its arrays borrowed, in compiled code."""
+    return guide
 
 
 def guide_robot(block: Any, lane: Any, row: Any, state: State, clock: Any, path: Any, before: Any, guide: Any) -> Any:
@@ -65,12 +68,19 @@ def guide_robot(block: Any, lane: Any, row: Any, state: State, clock: Any, path:
 
     before: progress [m] so far, negative at the start of an episode.
     """
-    raise NotImplementedError
+    fetch = _by_the_clock if isinstance(guide, Timetable) else _at_its_pace
+    return fetch(block, lane, row, state, clock, path, before, guide)
 
 
-def judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, guide: Any) -> Any:
+def weights_of(guide: Any) -> Any:
+    """What the task of a guide is worth, by name."""
+    return _weights_in_time(guide) if isinstance(guide, Timetable) else _weights_on_path(guide)
+
+
+def judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
     """Errors, endings, and the reward's terms."""
-    raise NotImplementedError
+    verdict = _judge_in_time if isinstance(weights, Weights) else _judge_on_path
+    return verdict(state, reference, torques, record, situation, robot, weights)
 
 
 @register_jitable(**INLINE)
@@ -87,6 +97,17 @@ def _by_the_clock(
         for j in range(POINT_ROWS):
             block[(row + p * POINT_ROWS + j) * LANES + lane] = guide.samples[then, j]
     return 0.0, 0.0
+
+
+@register_jitable(**INLINE)
+def _entry(numbers: Any, i: Any) -> Any:
+    return numbers[i]
+
+
+@register_jitable(**INLINE)
+def _numbers(numbers: Any, like: Any) -> Any:
+    """As many numbers of an array as the tuple `like` has items."""
+    return each(_entry, (numbers,), counting(like))
 
 
 @register_jitable(**INLINE)
@@ -171,10 +192,19 @@ def _at_its_pace(
 
 
 @register_jitable(**INLINE)
+def _weights_in_time(guide: Timetable) -> Weights:
+    return Weights(*_numbers(guide.weights, _WEIGHTS))
+
+
+@register_jitable(**INLINE)
+def _weights_on_path(guide: Courses) -> FollowWeights:
+    return FollowWeights(*_numbers(guide.weights, _FOLLOW_WEIGHTS))
+
+
+@register_jitable(**INLINE)
 def _judge_in_time(
-    state: State, reference: Reference, torques: Any, record: Any, _situation: Any, robot: Any, guide: Timetable
+    state: State, reference: Reference, torques: Any, record: Any, _situation: Any, robot: Any, weights: Weights
 ) -> Any:
-    weights = guide.weights
     errors = tracking_errors(state, reference)
     ended = endings(state, errors, record, weights.corridor, weights.touching_ends)
     terms = reward_terms(errors, mean_effort(torques, robot), record, _any_of(ended), weights)
@@ -183,9 +213,8 @@ def _judge_in_time(
 
 @register_jitable(**INLINE)
 def _judge_on_path(
-    state: State, reference: Reference, torques: Any, record: Any, situation: Any, robot: Any, guide: Courses
+    state: State, reference: Reference, torques: Any, record: Any, situation: Any, robot: Any, weights: FollowWeights
 ) -> Any:
-    weights = guide.weights
     errors = tracking_errors(state, reference)
     ended = endings(state, errors, record, weights.corridor, weights.touching_ends)
     effort = mean_effort(torques, robot)
@@ -214,14 +243,21 @@ def _guide_robot(block: Any, lane: Any, row: Any, state: Any, clock: Any, path: 
     )
 
 
-@overload(judge, jit_options=INLINE, strict=False)
-def _judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, guide: Any) -> Any:
+@overload(weights_of, jit_options=INLINE, strict=False)
+def _weights_of(guide: Any) -> Any:
     if _runs_by_the_clock(guide):
-        return lambda state, reference, torques, record, situation, robot, guide: _judge_in_time(
-            state, reference, torques, record, situation, robot, guide
+        return lambda guide: _weights_in_time(guide)
+    return lambda guide: _weights_on_path(guide)
+
+
+@overload(judge, jit_options=INLINE, strict=False)
+def _judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
+    if weights.instance_class is Weights:
+        return lambda state, reference, torques, record, situation, robot, weights: _judge_in_time(
+            state, reference, torques, record, situation, robot, weights
         )
-    return lambda state, reference, torques, record, situation, robot, guide: _judge_on_path(
-        state, reference, torques, record, situation, robot, guide
+    return lambda state, reference, torques, record, situation, robot, weights: _judge_on_path(
+        state, reference, torques, record, situation, robot, weights
     )
 
 
@@ -229,7 +265,7 @@ def _judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any
 def _borrowed_guide(guide: Any) -> Any:
     if _runs_by_the_clock(guide):
         return lambda guide: Timetable(
-            borrowed(guide.samples), borrowed(guide.spans), borrowed(guide.horizons), guide.weights
+            borrowed(guide.samples), borrowed(guide.spans), borrowed(guide.horizons), borrowed(guide.weights)
         )
     return lambda guide: Courses(
         borrowed(guide.samples),
@@ -241,5 +277,5 @@ def _borrowed_guide(guide: Any) -> Any:
         guide.arrival,
         guide.arrival_scale,
         guide.free_heading,
-        guide.weights,
+        borrowed(guide.weights),
     )

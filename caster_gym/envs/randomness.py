@@ -21,9 +21,16 @@ def mix(x: Any) -> Any:
     return x ^ (x >> _SHIFT_31)
 
 
+def episode_seed(key: Any, episode: Any) -> Any:
+    """What all numbers of an episode start from, for unsigned 64-bit key and episode."""
+    return mix(mix(key + _GOLDEN) + (episode + np.uint64(1)) * _GOLDEN)
+
+
+def bits(seed: Any, index: Any) -> Any:
+    """64 random bits for a seed and an unsigned 64-bit index."""
+    return mix(seed + (index + np.uint64(1)) * _GOLDEN)
+
+
 def uniform(key: Any, episode: Any, index: Any) -> Any:
     """A number in [0, 1) for unsigned 64-bit key, episode and index."""
-    x = mix(key + _GOLDEN)
-    x = mix(x + (episode + np.uint64(1)) * _GOLDEN)
-    x = mix(x + (index + np.uint64(1)) * _GOLDEN)
-    return float(x >> _SHIFT_11) * 1.1102230246251565e-16
+    return float(bits(episode_seed(key, episode), index) >> _SHIFT_11) * 1.1102230246251565e-16

@@ -83,7 +83,7 @@ def _track_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: Tr
         samples,
         _spans(rows, rows[:, 1] - rows[:, 0], longest),
         np.array([round(s / task.control_period) for s in task.preview], dtype=np.int64),
-        task.weights(),
+        np.array(task.weights()),
     )
     names = tuple(trajectory.name for trajectory in trajectories)
     poses = tuple(table[:, :4] for table in tables)
@@ -112,7 +112,7 @@ def _follow_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: F
         task.arrival,
         task.arrival_scale,
         float(task.free_heading),
-        task.weights(),
+        np.array(task.weights()),
     )
     names = tuple(course.name for course in courses)
     poses = tuple(table[:, [0, 1, 5, 6]] for table in tables)

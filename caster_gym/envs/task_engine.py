@@ -77,15 +77,16 @@ class TaskEngine:
         self._parameter_row = kernel.parameter_row(self._sizes)
         blocks = np.zeros((block_count(count), (self._parameter_row + nominal.shape[1]) * LANES))
         to_lanes(np.repeat(nominal, count, axis=0), blocks, self._parameter_row)
+        among = len(plan.around.obstacles.radii) > 0
         self._world = kernel.World(
             blocks=blocks,
             clocks=np.zeros((2, count), dtype=np.int64),
             seeds=np.zeros((2, count), dtype=np.uint64),
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
             guide=plan.guide,
-            hull=plan.around.hull,
-            obstacles=plan.around.obstacles if len(plan.around.obstacles.radii) else None,
-            arenas=plan.arenas,
+            hull=plan.around.hull if among else None,
+            obstacles=plan.around.obstacles if among else None,
+            arenas=plan.arenas if among else None,
             substeps=pace.substeps,
             time_step=pace.time_step,
         )

@@ -9,14 +9,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 
 from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
 from caster_gym.engines.lanes import BODY_ROWS, LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
 from caster_gym.envs import randomness
-from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge
+from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge, weights_of
 from caster_gym.envs.randomness import uniform
 from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
 from caster_gym.mechanics.integration import State, pack_state
@@ -48,8 +47,8 @@ class World(NamedTuple):
     seeds: Any  # uint64 (2, robots): key, episode
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
     guide: Any  # Timetable or Courses
-    hull: Hull
-    obstacles: Obstacles | None
+    hull: Any  # Hull; this and the next two are None where there is no obstacle
+    obstacles: Any  # Obstacles
     arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
     substeps: Any
     time_step: Any  # [s]
@@ -139,6 +138,13 @@ def parameter_row(sizes: Sizes) -> int:
 
 
 @register_jitable(**INLINE)
+def _borrowed_arenas(arenas: Any) -> Any:
+    if arenas is None:
+        return None
+    return borrowed(arenas)
+
+
+@register_jitable(**INLINE)
 def _borrowed_world(w: World) -> World:
     return World(
         borrowed(w.blocks),
@@ -148,7 +154,7 @@ def _borrowed_world(w: World) -> World:
         borrowed_guide(w.guide),
         borrowed_hull(w.hull),
         borrowed_obstacles(w.obstacles),
-        borrowed(w.arenas),
+        _borrowed_arenas(w.arenas),
         w.substeps,
         w.time_step,
     )
@@ -165,9 +171,55 @@ def _scaled(factor: Any, number: Any) -> Any:
 
 
 @register_jitable(**INLINE)
+def _neighbourhood(robot: Any, world: World) -> Any:
+    """First and end of the obstacles that a robot may meet."""
+    path = world.clocks[1, robot]
+    return world.arenas[path, 0], world.arenas[path, 1]
+
+
+@register_jitable(**INLINE)
+def _measure(block: Any, first: Any, here: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
+    """Measure the room of robots that may soon need to know it."""
+    if obstacles is None:
+        return
+    row = room_row(sizes)
+    for lane in range(here):
+        state = read_state(block, lane, 0, sizes.casters)
+        if worth_measuring(block[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
+            near, end = _neighbourhood(first + lane, world)
+            gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
+            block[row * LANES + lane] = gap
+
+
+@register_jitable(**INLINE)
+def _take_care(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
+    """Step the robots that may touch something."""
+    if obstacles is None:
+        return
+    for lane in range(here):
+        if block[room_row(sizes) * LANES + lane] < 0.0:
+            near, end = _neighbourhood(first + lane, world)
+            careful_step(block, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
+
+
+@register_jitable(**INLINE)
+def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: World, sizes: Sizes) -> Any:
+    """Write the nearest obstacles; returns the gap to the nearest one. [m]"""
+    gap = math.inf
+    if obstacles is None:
+        return gap
+    near, end = _neighbourhood(robot, world)
+    for k in range(near, end):
+        apart = separation(state.position, state.heading, world.hull, obstacles, k)
+        gap = min(apart.gap, gap)
+        _insert(block, lane, nearest_row(sizes), apart.gap, apart.nx, apart.ny, sizes)
+    return gap
+
+
+@register_jitable(**INLINE)
 def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
     """Let robots, the first of the batch's in this block being `first`, move for a control period."""
-    rows, room_at, h, reach = torque_row(sizes), room_row(sizes), world.time_step, world.hull.reach
+    rows, room_at, h = torque_row(sizes), room_row(sizes), world.time_step
     share = 1.0 / world.substeps
     for row in range(rows, reference_row(sizes)):
         for lane in range(lanes):
@@ -180,82 +232,13 @@ def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: S
             wrench = read(block, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
             robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
             target, drive = driven_step(state, commands, wrench, h, robot)
-            end, room, went = settled(world.obstacles, block[room_at * LANES + lane], state, target, h, reach)
+            room = block[room_at * LANES + lane]
+            end, room, went = settled(world.obstacles, room, state, target, h, world.hull)
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
             write(block, lane, 0, end)
             write(block, lane, rows, add(read(block, lane, rows, mean), mean))
             block[room_at * LANES + lane] = room
         _take_care(block, first, here, share, world.obstacles, world, sizes)
-
-
-def _measure(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> None:
-    """Measure the room of robots that may soon need to know it."""
-    raise NotImplementedError
-
-
-def _take_care(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> None:
-    """Step the robots that may touch something."""
-    raise NotImplementedError
-
-
-def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
-    """Write the nearest obstacles; returns the gap to the nearest one. [m]"""
-    raise NotImplementedError
-
-
-@overload(_measure, jit_options=INLINE, strict=False)
-def _measure_compiled(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda block, first, here, obstacles, world, sizes: None
-
-    def among(block: Any, first: Any, here: Any, obstacles: Any, world: Any, sizes: Any) -> None:
-        row = room_row(sizes)
-        for lane in range(here):
-            state = read_state(block, lane, 0, sizes.casters)
-            if worth_measuring(block[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
-                near, end = _neighbourhood(first + lane, world)
-                gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
-                block[row * LANES + lane] = gap
-
-    return among
-
-
-@overload(_take_care, jit_options=INLINE, strict=False)
-def _take_care_compiled(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda block, first, here, share, obstacles, world, sizes: None
-
-    def among(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: Any, sizes: Any) -> None:
-        for lane in range(here):
-            if block[room_row(sizes) * LANES + lane] < 0.0:
-                near, end = _neighbourhood(first + lane, world)
-                careful_step(block, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
-
-    return among
-
-
-@overload(_look_around, jit_options=INLINE, strict=False)
-def _look_around_compiled(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
-    if isinstance(obstacles, types.NoneType):
-        return lambda block, lane, robot, state, obstacles, world, sizes: math.inf
-
-    def among(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: Any, sizes: Any) -> Any:
-        near, end = _neighbourhood(robot, world)
-        gap = math.inf
-        for k in range(near, end):
-            apart = separation(state.position, state.heading, world.hull, obstacles, k)
-            gap = min(apart.gap, gap)
-            _insert(block, lane, nearest_row(sizes), apart.gap, apart.nx, apart.ny, sizes)
-        return gap
-
-    return among
-
-
-@register_jitable(**INLINE)
-def _neighbourhood(robot: Any, world: World) -> Any:
-    """First and end of the obstacles that a robot may meet."""
-    path = world.clocks[1, robot]
-    return world.arenas[path, 0], world.arenas[path, 1]
 
 
 def _careful_step(
@@ -311,6 +294,7 @@ def _read_neighbour(block: Any, lane: Any, row: Any, index: Any) -> Any:
 @register_jitable(**INLINE)
 def _look(block: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
     """Observe and score robots whose reference has been fetched."""
+    weights = weights_of(guide)
     for i in range(lanes):
         lane = first + i
         state = read_state(block, lane, 0, sizes.casters)
@@ -321,7 +305,7 @@ def _look(block: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
         situation = Situation(*read(block, lane, situation_row(sizes), _SITUATION))
         nearest = each(_read_neighbour, (block, lane, nearest_row(sizes)), counting(sizes.nearest))
         robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
-        errors, ended, terms = judge(state, reference, torques, record, situation, robot, guide)
+        errors, ended, terms = judge(state, reference, torques, record, situation, robot, weights)
         told = report(state, reference, errors, torques, record, situation, ended, terms, robot)
         write(block, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, robot))
         write(block, lane, report_row(sizes), flat_report(told, torques))
@@ -354,16 +338,18 @@ def _insert(block: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: 
 
 
 @register_jitable(**INLINE)
-def _deliver(block: Any, lane: Any, robot: Any, views: Views, sizes: Sizes) -> None:
-    """Copy a robot's observation and report to where Python reads them."""
+def _deliver(block: Any, lane: Any, count: Any, robot: Any, views: Views, sizes: Sizes) -> None:
+    """Copy observations and reports of so many robots, from a lane and a robot on, to where Python reads them."""
     row = observation_row(sizes)
-    for j in range(views.observations.shape[1]):
-        views.observations[robot, j] = block[(row + j) * LANES + lane]
+    for i in range(count):
+        for j in range(views.observations.shape[1]):
+            views.observations[robot + i, j] = block[(row + j) * LANES + lane + i]
     row = report_row(sizes)
     for j in range(views.reports.shape[0]):
-        views.reports[j, robot] = block[(row + j) * LANES + lane]
-    sin, cos = views.reports[HEADING_SIN, robot], views.reports[HEADING_COS, robot]
-    views.reports[HEADING_SIN, robot] = math.atan2(sin, cos)
+        for i in range(count):
+            views.reports[j, robot + i] = block[(row + j) * LANES + lane + i]
+    for i in range(robot, robot + count):
+        views.reports[HEADING_SIN, i] = math.atan2(views.reports[HEADING_SIN, i], views.reports[HEADING_COS, i])
 
 
 @register_jitable(**INLINE)
@@ -383,9 +369,8 @@ def _step_lanes(i: Any, lanes: Any, look: Any, world: World, actions: Any, views
         world.clocks[0, first + lane] += 1
         _fetch(block, lane, first + lane, block[situation_row(sizes) * LANES + lane], world, sizes)
     look(block, world.guide, sizes)
-    for lane in range(here):
-        robot = first + lane
-        _deliver(block, lane, robot, views, sizes)
+    _deliver(block, 0, here, first, views, sizes)
+    for robot in range(first, first + here):
         reward = 0.0
         for j in range(TERMS):
             reward += views.reports[FIRST_TERM + j, robot]
@@ -458,7 +443,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
             block[row * LANES + lane] = 0.0
         _fetch(block, lane, robot, -1.0, world, sizes)
         look_at_one(block, lane, world.guide, sizes)
-        _deliver(block, lane, robot, views, sizes)
+        _deliver(block, lane, 1, robot, views, sizes)
 
 
 careful_step = compiled(_careful_step)

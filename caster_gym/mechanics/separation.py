@@ -8,8 +8,6 @@ vectors from the obstacle to the robot, in W.
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from caster_gym.mechanics.scalars import Direction, Scalar, entry, maximum, minimum, sqrt, where
 
 TOUCH = 2e-5  # [m] nearer than this counts as touching
@@ -42,9 +40,6 @@ class Surroundings(NamedTuple):
 
     hull: Hull
     obstacles: Obstacles
-
-
-NO_HULL = Hull(np.zeros((0, 3)), np.zeros((1, 2)), 0.0, 0.0)
 
 
 class Separation(NamedTuple):

@@ -9,13 +9,11 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs.randomness import mix
+from caster_gym.envs.randomness import bits, episode_seed
 
 Array = NDArray[np.float64]
 Seeds = NDArray[np.uint64]
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_ONE = np.uint64(1)
 _SHIFT_11, _SHIFT_12 = np.uint64(11), np.uint64(12)
 
 
@@ -26,24 +24,21 @@ def stream(place: int, kind: str) -> np.uint64:
 
 def seeds_of(keys: Seeds, episodes: Seeds, of: np.uint64) -> Seeds:
     """Seeds (robots,) of a stream in the episodes of robots."""
-    seeds: Seeds = mix(mix((keys ^ of) + _GOLDEN) + (episodes + _ONE) * _GOLDEN)
+    seeds: Seeds = episode_seed(keys ^ of, episodes)
     return seeds
 
 
 def uniforms(seeds: Seeds, indices: NDArray[np.int64]) -> Array:
     """Numbers (robots, k) in [0, 1) for seeds (robots,) and indices (k,) or (robots, k)."""
-    numbers: Array = (_bits(seeds, indices) >> _SHIFT_11).astype(np.float64) * 2.0**-53
-    return numbers
+    drawn: Seeds = bits(seeds[:, None], indices.astype(np.uint64)) >> _SHIFT_11
+    return drawn.astype(np.float64) * 2.0**-53
 
 
 def normals(seeds: Seeds, indices: NDArray[np.int64]) -> Array:
     """Standard normal numbers (robots, k), by the inverse of their distribution."""
     from scipy.special import ndtri  # late: most environments make no noise
 
-    numbers: Array = ndtri(((_bits(seeds, indices) >> _SHIFT_12).astype(np.float64) + 0.5) * 2.0**-52)
+    numbers: Array = ndtri(
+        ((bits(seeds[:, None], indices.astype(np.uint64)) >> _SHIFT_12).astype(np.float64) + 0.5) * 2.0**-52
+    )
     return numbers
-
-
-def _bits(seeds: Seeds, indices: NDArray[np.int64]) -> Seeds:
-    bits: Seeds = mix(seeds[:, None] + (indices.astype(np.uint64) + _ONE) * _GOLDEN)
-    return bits

@@ -3,6 +3,7 @@
 Arrays have one row per robot. `robots` picks some of them: an array of indices, or slice(None) for all.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
@@ -102,31 +103,31 @@ class Runtime:
         return observations
 
 
-class RewardRuntime(Runtime):
+class RewardRuntime(Runtime, ABC):
     """A feature that adds a term to the reward."""
 
     def __init__(self, name: str) -> None:
         self.name = name
 
+    @abstractmethod
     def term(self, quantities: Quantities, terminated: Flags) -> Array:
         """The term (robots,) of a step."""
-        raise NotImplementedError
 
 
-class PlantRuntime(Runtime):
+class PlantRuntime(Runtime, ABC):
     """A feature that changes the plant, which no agent is told."""
 
+    @abstractmethod
     def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
         """Mechanics parameters (k, fields) of robots whose episodes with these seeds (k,) are about to start."""
-        raise NotImplementedError
 
 
-class PushingRuntime(Runtime):
+class PushingRuntime(Runtime, ABC):
     """A feature that pushes the robots from outside."""
 
+    @abstractmethod
     def wrenches(self) -> Array:
         """Wrenches at C in B (robots, 3) during the coming control period. [N, N, N m]"""
-        raise NotImplementedError
 
 
 class Feature(Frozen):
@@ -135,6 +136,6 @@ class Feature(Frozen):
     redefines_actions: ClassVar[bool] = False
     """Whether actions mean something else outside; only one feature of an environment may do that."""
 
+    @abstractmethod
     def runtime(self, place: Place) -> Runtime:
         """The feature at work. Raises ValueError for a place where it cannot be."""
-        raise NotImplementedError
