@@ -11,16 +11,9 @@ from scipy.optimize import brentq
 from caster_gym import Model, load_robot
 from caster_gym.arena import read_arena
 from caster_gym.arena.packing import surroundings
-from caster_gym.mechanics.contact import (
-    _FOUND,
-    STILL,
-    first_contact,
-    free_time,
-    guarded_step,
-    press,
-    sweep_between,
-    value,
-)
+from caster_gym.mechanics.contact import guarded_step
+from caster_gym.mechanics.contact_impulses import STILL, press
+from caster_gym.mechanics.first_contact import FOUND, first_contact, free_time, sweep_between, value
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
@@ -59,12 +52,13 @@ class Walk:
         self.state = state
         torque = np.zeros(2 * robot.caster_count) if torque is None else torque
         self.torques = tuple((float(torque[2 * i]), float(torque[2 * i + 1])) for i in range(robot.caster_count))
+        self.wrench = (0.0, 0.0, 0.0)
         self.impulse, self.impacts, self.pressing = np.zeros(2), 0.0, 0.0
 
     def step(self, h, steps=1):
         for _ in range(steps):
             self.state, touch = guarded_step(
-                self.state, self.torques, (0.0, 0.0, 0.0), h, self.parameters, self.hull, self.obstacles, 0, self.count
+                self.state, self.torques, self.wrench, h, self.parameters, self.hull, self.obstacles, 0, self.count
             )
             self.impulse = self.impulse + np.stack(touch.impulse, -1)
             self.impacts = self.impacts + touch.impacts
@@ -144,7 +138,7 @@ def test_an_impact_loses_the_energy_that_it_must(seed, casters, outline, e, mu):
     arm = np.array([n[0], n[1], point[0] * n[1] - point[1] * n[0]])
     mobility = arm @ np.linalg.solve(model.inertia(angles), arm)
     v_n = arm @ state.twist
-    after, pressure = press(state.twist, state, state.heading, e, 1e9, walk.parameters, walk.hull, obstacles, 0, 1)
+    after, pressure = press(state, e, walk.parameters, walk.hull, obstacles, 0, 1)
     before_J, after_J = energy(model, state), model.kinetic_energy(angles, after)
     rounding = 1e-12 * max(before_J, 1.0)
     if v_n >= 0.0:
@@ -170,7 +164,7 @@ def test_a_disc_thrown_straight_at_a_wall_bounces_where_and_when_it_must(e, h):
     steps = round(total / h)
     walk.step(h, steps)
     expected = 0.9 - e * 2.0 * (steps * h - 0.025)
-    assert_allclose(walk.state.position, (expected, 0.0), rtol=0.0, atol=2.0 * _FOUND)  # the search stops that early
+    assert_allclose(walk.state.position, (expected, 0.0), rtol=0.0, atol=2.0 * FOUND)  # the search stops that early
     assert_allclose(walk.state.twist, (-2.0 * e, 0.0, 0.0), rtol=0.0, atol=1e-12)  # rounding
     mass = Model(robot).inertia(np.zeros(3))[0, 0]
     assert_allclose(walk.impulse, (-(1.0 + e) * mass * 2.0, 0.0), rtol=0.0, atol=1e-9)  # rests without a force
@@ -217,7 +211,7 @@ def test_a_step_with_an_impact_is_free_motion_the_impulse_and_free_motion(seed, 
     # the search stops 1 µm before the contact, so that the impact is 1 µs early: twists change by 1e-3 in that time at
     # most; RK4 at 2 ms adds less
     assert_allclose(walk.impulse, (-hit[1], hit[0]), rtol=0.0, atol=1e-3 * hit[0])
-    assert_allclose(walk.state.position, expected.position, rtol=0.0, atol=3.0 * _FOUND)
+    assert_allclose(walk.state.position, expected.position, rtol=0.0, atol=3.0 * FOUND)
     assert_allclose(walk.state.twist, expected.twist, rtol=0.0, atol=2e-3)
 
 
@@ -291,7 +285,7 @@ def test_no_contact_happens_in_the_time_that_is_free(seed, outline):
         assert separation(*pose, hull, obstacles, 0).gap.min() > -1e-12
     if contact < h:
         pose = tuple(value(p, contact) for p in (sweep.x, sweep.y, sweep.c, sweep.s))
-        assert separation(pose[:2], pose[2:], hull, obstacles, 0).gap < 2.0 * _FOUND
+        assert separation(pose[:2], pose[2:], hull, obstacles, 0).gap < 2.0 * FOUND
 
 
 # Contacts that last
@@ -391,6 +385,37 @@ def test_a_robot_that_leans_against_a_wall_comes_to_rest(h, e):
         assert abs(walk.gap) < 2e-5
         assert abs(walk.state.twist[1]) < 10.0 * STILL
     assert walk.impacts == impacts
+
+
+@pytest.mark.parametrize(("e", "mu"), [(0.3, 0.3), (0.7, 0.5)])
+def test_a_robot_that_is_pushed_into_a_corner_comes_to_rest(e, mu):
+    """Two walls whose friction loads each other: neither may be given more than both need together."""
+    robot = load_robot("chung2008")
+    sides = [{"point": [-0.5, 0.0], "normal": [1.0, 0.0]}, {"point": [0.0, -0.5], "normal": [0.0, 1.0]}]
+    around = around_it(robot, {"half_planes": sides}, restitution=e, friction=mu)
+    walk = Walk(robot, around, floats(state_of(-0.2, -0.1, 0.3, (0.0, 0.0), 0.0, np.array([0.4, 1.9, -2.0]))))
+
+    def pushed(steps):
+        for _ in range(steps):
+            c, s = walk.state.heading
+            walk.wrench = (-20.0 * c - 14.0 * s, 20.0 * s - 14.0 * c, 0.0)  # (−20, −14) N in W
+            walk.step(5e-3)
+
+    pushed(800)
+    impacts = walk.impacts
+    pushed(200)
+    assert walk.impacts == impacts
+    assert abs(walk.gap) < 2e-5
+    assert np.abs(walk.state.twist).max() < 1e-3  # casters still turn a little, against nothing but their inertia
+
+
+def test_numbers_that_are_not_finite_are_not_hidden_by_obstacles():
+    """Far beyond the speeds that a step can follow, the robot is lost, not frozen where it was."""
+    robot = load_robot("chung2008")
+    around = around_it(robot, {"room": [[-2.0, -2.0], [2.0, 2.0]]})
+    start = floats(state_of(0.0, 0.0, 0.0, (1e200, 0.0), 0.0, np.array([0.4, 1.9, -2.0])))
+    walk = Walk(robot, around, start).step(5e-3)
+    assert not np.isfinite([*walk.state.position, *walk.state.twist]).all()
 
 
 @pytest.mark.parametrize("outline", [0.1, TRIANGLE, BOX], ids=["disc", "triangle", "box"])

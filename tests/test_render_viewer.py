@@ -255,3 +255,22 @@ def test_gymnasium_records_it(tmp_path):
     frames = iio.imread(video)
     assert frames.shape == (21, SMALL[1], SMALL[0], 3)  # the start and twenty steps
     assert np.abs(frames[0].astype(int) - frames[-1]).max() > 50
+
+
+def test_a_robot_whose_numbers_have_gone_is_drawn_where_it_was_last():
+    viewer = Viewer("rgb_array", SMALL)
+    viewer.show([scene(1.0, 0.1, time=0.02)])
+    lost = viewer.show([scene(np.nan, 0.1, time=0.04)])
+    known = Viewer("rgb_array", SMALL)
+    known.show([scene(1.0, 0.1, time=0.02)])
+    assert_array_equal(lost, known.show([scene(1.0, 0.1, time=0.04, failed=True)]))
+
+
+def test_events_that_nobody_reads_do_not_pile_up(dummy_display):
+    """Else a full queue would lose the wish to close the window."""
+    viewer = Viewer("human", SMALL, fps=1000.0)
+    viewer.show([scene()])
+    pygame.event.post(pygame.event.Event(pygame.USEREVENT))
+    viewer.show([scene()])
+    assert not pygame.event.peek(pygame.USEREVENT)
+    viewer.close()

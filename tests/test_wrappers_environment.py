@@ -1,6 +1,7 @@
 """caster_gym.wrappers.environment and stack: one definition for one robot and for a batch."""
 
 import copy
+import pickle
 
 import gymnasium as gym
 import numpy as np
@@ -284,3 +285,16 @@ def spoil(value):
             spoil(item)
     else:
         value[...] = None if value.dtype == object else 7
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+def test_a_copy_draws_what_the_original_draws(copied):
+    """Seeds given after copying count, episode by episode."""
+    original = wrap(CasterTrackVectorEnv(3, **TASK), SensorNoise(position_bias=0.05))
+    other = copied(original)
+    seen = []
+    for seed in (1, 2):
+        seen.append(original.reset(seed=seed)[0])
+        assert_array_equal(other.reset(seed=seed)[0], seen[-1])
+        assert_array_equal(other.reset()[0], original.reset()[0])
+    assert not np.array_equal(*seen)

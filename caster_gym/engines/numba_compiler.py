@@ -17,6 +17,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
@@ -24,7 +25,9 @@ from caster_gym.mechanics import (
     actuation,
     caster,
     contact,
+    contact_impulses,
     dynamics,
+    first_contact,
     ground,
     impulse,
     integration,
@@ -39,7 +42,14 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 INLINE: Any = {"forceinline": True}  # Numba names the type of its options in stubs only
 _SETTINGS: Any = numba.config  # makes its attributes at run time
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
-_LOOPS_AND_CHOICES |= {scalars.flatten, scalars.greatest, scalars.register, scalars.anywhere, scalars.entry}
+_LOOPS_AND_CHOICES |= {
+    scalars.flatten,
+    scalars.greatest,
+    scalars.register,
+    scalars.anywhere,
+    scalars.entry,
+    scalars.memory,
+}
 
 
 def teach(module: ModuleType) -> None:
@@ -129,6 +139,11 @@ def _entry(table: Any, i: Any, j: Any) -> Any:
     return lambda table, i, j: table[i, j]  # table[i][j] would make an array of the row
 
 
+@overload(scalars.memory, jit_options=INLINE, strict=False)
+def _memory(nothing: Any, count: Any) -> Any:
+    return lambda nothing, count: np.zeros(count)
+
+
 @overload(scalars.sqrt, jit_options=INLINE, strict=False)
 def _sqrt(x: Any) -> Any:
     return lambda x: math.sqrt(x)
@@ -207,18 +222,7 @@ def _each(function: Any, shared: Any, *columns: Any) -> Any:
     )
 
 
-for _module in (
-    scalars,
-    linear,
-    caster,
-    dynamics,
-    integration,
-    motors,
-    plant,
-    ground,
-    impulse,
-    actuation,
-    separation,
-    contact,
-):
+for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
+    teach(_module)
+for _module in (separation, first_contact, contact_impulses, contact):
     teach(_module)

@@ -65,10 +65,12 @@ def _take_care(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, caster
 
 
 @register_jitable(**INLINE)
-def _step_lanes(block: Any, lanes: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
-    """One RK4 step of the first robots of one block."""
+def _step_lanes(
+    block: Any, lanes: int, here: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...]
+) -> None:
+    """One RK4 step of the first lanes of one block, of which the first `here` hold robots and the rest are spare."""
     row = room_row(casters)
-    _measure(block, lanes, h, hull, obstacles, casters)
+    _measure(block, here, h, hull, obstacles, casters)
     for lane in range(lanes):
         state = read_state(block, lane, 0, casters)
         torques = read_pairs(block, lane, torque_row(casters), casters)
@@ -77,7 +79,7 @@ def _step_lanes(block: Any, lanes: int, h: float, hull: Hull, obstacles: Any, ca
         end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, hull)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
-    _take_care(block, lanes, h, hull, obstacles, casters)
+    _take_care(block, here, h, hull, obstacles, casters)
 
 
 def _careful_step(block: Any, lane: int, h: float, hull: Hull, obstacles: Obstacles, casters: tuple[int, ...]) -> None:
@@ -92,23 +94,34 @@ def _careful_step(block: Any, lane: int, h: float, hull: Hull, obstacles: Obstac
     block[row * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, 0, count)
 
 
-def _step_one(blocks: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
+def _step_one(blocks: Any, steps: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...]) -> None:
     near, around = borrowed_hull(hull), borrowed_obstacles(obstacles)
     for _ in range(steps):
-        _step_lanes(blocks[0], 1, h, near, around, casters)
+        _step_lanes(blocks[0], 1, 1, h, near, around, casters)
 
 
-def _step_block(block: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]) -> None:
+def _step_block(
+    block: Any, here: int, steps: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...]
+) -> None:
     near, around = borrowed_hull(hull), borrowed_obstacles(obstacles)
     for _ in range(steps):
-        _step_lanes(block, LANES, h, near, around, casters)
+        _step_lanes(block, LANES, here, h, near, around, casters)
 
 
 def _step_blocks(
-    first: int, end: int, blocks: Any, steps: int, h: float, hull: Hull, obstacles: Any, casters: tuple[int, ...]
+    first: int,
+    end: int,
+    blocks: Any,
+    count: int,
+    steps: int,
+    h: float,
+    hull: Any,
+    obstacles: Any,
+    casters: tuple[int, ...],
 ) -> None:
     for i in range(first, end):
-        _compiled_step_block(blocks[i], steps, h, hull, obstacles, casters)
+        here = min(LANES, count - i * LANES)
+        _compiled_step_block(blocks[i], here, steps, h, hull, obstacles, casters)
 
 
 _compiled_careful_step = compiled(_careful_step)
@@ -181,11 +194,11 @@ class Fleet:
         for robot in self._distinct:
             robot.check_time_step(dt)
         to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)
-        arguments = (self._blocks, steps, dt, self._hull, self._obstacles, self._casters)
+        arguments = (steps, dt, self._hull, self._obstacles, self._casters)
         if self.count == 1:
-            _compiled_step_one(*arguments)
+            _compiled_step_one(self._blocks, *arguments)
         else:
-            over_blocks(_compiled_step_blocks, len(self._blocks), *arguments)
+            over_blocks(_compiled_step_blocks, len(self._blocks), self._blocks, self.count, *arguments)
 
     def _checked(self, name: str, value: ArrayLike, width: int) -> NDArray[np.float64]:
         array = np.asarray(value, dtype=np.float64)

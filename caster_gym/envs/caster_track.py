@@ -53,12 +53,13 @@ class CasterTrackEnv(CasterEnv):
     | reward_terms | the terms above, by name | – |
     | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
     | power | mean mechanical power of all motors over the control period | W |
-    | traction_use | largest share of the floor's friction that a wheel uses; above 1 it would slip | – |
+    | traction_use | largest share of the floor's friction that a wheel uses by the torques; above 1 it slips | – |
     | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |
     | pose, reference_pose | x, y, cos β, sin β in W | m, – |
     | progress, progress_share | 0 in this task | m, – |
     | clearance | gap to the nearest obstacle; inf where there is none | m |
-    | impacts, normal_impulse | number of impacts in the control period; sum of all normal impulses | –, N s |
+    | impacts | number of impacts faster than 1 cm/s in the control period | – |
+    | normal_impulse | sum of all normal impulses of obstacles, of impacts and of lasting contacts | N s |
     | impulse | sum of the impulses of obstacles on the robot, in W | N s |
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.threads import over_blocks
+from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
 from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.observation import ObservationLayout
@@ -62,23 +63,23 @@ class TaskEngine:
     on_restart: functions that are called with the indices of robots that start a new episode, before they are placed.
     """
 
-    def __init__(self, robot: Robot, plan: Plan, pace: Pace, layout: ObservationLayout, count: int) -> None:
+    def __init__(self, robot: Robot, plan: Plan, pace: Pace, observed: ObservationLayout, count: int) -> None:
         robot.check_time_step(pace.time_step)
         announce_compilation(kernel.restart, "the environment")
-        self.robot, self.plan, self.layout, self.count = robot, plan, layout, count
+        self.robot, self.plan, self.layout, self.count = robot, plan, observed, count
         self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
         self._pace = pace
-        self._sizes = kernel.Sizes(
-            tuple(range(robot.caster_count)), tuple(range(len(layout.preview))), tuple(range(layout.nearest))
+        self._sizes = layout.Sizes(
+            tuple(range(robot.caster_count)), tuple(range(len(observed.preview))), tuple(range(observed.nearest))
         )
         self._spread = np.array([pace.start_offset, pace.start_turn])
-        self._report_rows = kernel.FIXED_REPORT_ROWS + 2 * robot.caster_count
+        self._report_rows = layout.FIXED_REPORT_ROWS + 2 * robot.caster_count
         nominal = np.array([pack_parameters(robot_parameters(robot))])
-        self._parameter_row = kernel.parameter_row(self._sizes)
+        self._parameter_row = layout.parameter_row(self._sizes)
         blocks = np.zeros((block_count(count), (self._parameter_row + nominal.shape[1]) * LANES))
         to_lanes(np.repeat(nominal, count, axis=0), blocks, self._parameter_row)
         among = len(plan.around.obstacles.radii) > 0
-        self._world = kernel.World(
+        self._world = layout.World(
             blocks=blocks,
             clocks=np.zeros((2, count), dtype=np.int64),
             seeds=np.zeros((2, count), dtype=np.uint64),
@@ -109,7 +110,7 @@ class TaskEngine:
         for prepare in self.on_restart:
             prepare(selected)
         outcome = self._empty() if into is None else into
-        views = kernel.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
+        views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         kernel.restart(selected, paths, self._world, self._spread, views, self._sizes)
         return outcome
@@ -133,7 +134,7 @@ class TaskEngine:
         observations = np.empty((self.count, self.layout.size), dtype=np.float32)
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
-        arguments = (self._world, actions, kernel.Views(observations, reports, results), self._sizes)
+        arguments = (self._world, actions, layout.Views(observations, reports, results), self._sizes)
         if self.count == 1:
             kernel.step_single(*arguments)
         else:
@@ -154,13 +155,13 @@ class TaskEngine:
     @property
     def states(self) -> NDArray[np.float64]:
         """A copy of all states (robots, 7 + 2 N), laid out as in `caster_gym.engines.numba_fleet.Fleet`."""
-        return from_lanes(self._world.blocks, 0, kernel.room_row(self._sizes), self.count)
+        return from_lanes(self._world.blocks, 0, layout.room_row(self._sizes), self.count)
 
     @states.setter
     def states(self, value: NDArray[np.float64]) -> None:
         to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, 0)
         if self._world.obstacles is not None:
-            to_lanes(np.zeros((self.count, 1)), self._world.blocks, kernel.room_row(self._sizes))
+            to_lanes(np.zeros((self.count, 1)), self._world.blocks, layout.room_row(self._sizes))
 
     @property
     def wrenches(self) -> NDArray[np.float64]:
@@ -168,13 +169,13 @@ class TaskEngine:
 
         They act until they are set again; an episode starts without any, whatever was set before its first step.
         """
-        return from_lanes(self._world.blocks, kernel.wrench_row(self._sizes), 3, self.count)
+        return from_lanes(self._world.blocks, layout.wrench_row(self._sizes), 3, self.count)
 
     @wrenches.setter
     def wrenches(self, value: NDArray[np.float64]) -> None:
         if np.shape(value) != (self.count, 3):
             raise ValueError(f"wrenches must have shape {(self.count, 3)}, got {np.shape(value)}")
-        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, kernel.wrench_row(self._sizes))
+        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, layout.wrench_row(self._sizes))
 
     @property
     def parameters(self) -> NDArray[np.float64]:
@@ -204,13 +205,13 @@ class TaskEngine:
         return self._named(report.tolist(), lambda first, end: report[first:end])
 
     def _named(self, row: Any, rows: Callable[[int, int], NDArray[np.float64]]) -> dict[str, Any]:
-        terms, pose = kernel.FIRST_TERM, kernel.FIRST_POSE
-        record, situation = kernel.FIRST_RECORD, kernel.FIRST_SITUATION
+        terms, pose = layout.FIRST_TERM, layout.FIRST_POSE
+        record, situation = layout.FIRST_RECORD, layout.FIRST_SITUATION
         return {
             "position_error": row[3],
-            "heading_error": row[kernel.HEADING_SIN],
+            "heading_error": row[layout.HEADING_SIN],
             "reward_terms": {name: row[terms + i] for i, name in enumerate(self.plan.terms)},
-            "torque": rows(kernel.FIXED_REPORT_ROWS, len(row)),
+            "torque": rows(layout.FIXED_REPORT_ROWS, len(row)),
             "power": row[record],
             "traction_use": row[6],
             "conditioning": row[7],
@@ -231,27 +232,27 @@ class TaskEngine:
         """What there is to see of one robot."""
         state = self.states[robot]
         row = self._world.blocks[robot // LANES].reshape(-1, LANES)[:, robot % LANES]
-        report = row[kernel.report_row(self._sizes) : self._parameter_row]
+        report = row[layout.report_row(self._sizes) : self._parameter_row]
         path = int(self._world.clocks[1, robot])
         near, end = self.plan.arenas[path]
-        record = report[kernel.FIRST_RECORD :]
+        record = report[layout.FIRST_RECORD :]
         return Scene(
             robot=self.robot,
             time=float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
             pose=state[:4],
             twist=state[4:7],
             directions=state[7:].reshape(-1, 2),
-            torque=report[kernel.FIXED_REPORT_ROWS :].copy(),
-            ground_forces=self._ground_forces(state, report[kernel.FIXED_REPORT_ROWS :]),
+            torque=report[layout.FIXED_REPORT_ROWS :].copy(),
+            ground_forces=self._ground_forces(state, report[layout.FIXED_REPORT_ROWS :]),
             path=self.plan.tables[path][:, :2],
             corridor=self._pace.corridor,
-            reference=report[kernel.FIRST_POSE + 4 : kernel.FIRST_POSE + 8].copy(),
+            reference=report[layout.FIRST_POSE + 4 : layout.FIRST_POSE + 8].copy(),
             obstacles=self.plan.around.obstacles._replace(
                 radii=self.plan.around.obstacles.radii[near:end], spans=self.plan.around.obstacles.spans[near:end]
             ),
             impulse=record[1:3].copy(),
             impact_point=record[4:6].copy() if record[6] > 0.0 else np.full(2, np.nan),
-            failed=bool(report[: kernel.ENDINGS].any()),
+            failed=bool(report[: layout.ENDINGS].any()),
         )
 
     def _ground_forces(self, state: NDArray[np.float64], torque: NDArray[np.float64]) -> NDArray[np.float64]:

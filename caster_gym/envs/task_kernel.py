@@ -1,20 +1,39 @@
-"""The compiled step of every task: how its quantities lie in a block, and the loops over the block's robots.
-
-Rows of a block: state, room, wrench, motor commands, mean motor torques, record, reference, preview, situation, nearest
-obstacles, observation, report, robot parameters. The tuples in `Sizes` have an item per caster, per previewed point and
-per observed obstacle: their lengths are part of their types, so that all rows are constants of the compiled code.
-"""
+"""The compiled step of every task: the loops over the robots of a block, see `caster_gym.envs.block_layout`."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
 from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
-from caster_gym.engines.lanes import BODY_ROWS, LANES, counting, read, read_pairs, read_robot, read_state, write
+from caster_gym.engines.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
 from caster_gym.envs import randomness
+from caster_gym.envs.block_layout import (
+    ENDINGS,
+    FIRST_TERM,
+    HEADING_COS,
+    HEADING_SIN,
+    NEIGHBOUR_ROWS,
+    RECORD_ROWS,
+    SITUATION_ROWS,
+    TERMS,
+    Sizes,
+    Views,
+    World,
+    command_row,
+    nearest_row,
+    observation_row,
+    parameter_row,
+    record_row,
+    reference_row,
+    report_row,
+    room_row,
+    situation_row,
+    torque_row,
+    wrench_row,
+)
 from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge, weights_of
 from caster_gym.envs.randomness import uniform
 from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
@@ -23,13 +42,6 @@ from caster_gym.mechanics.plant import driven_step, guarded_driven_step
 from caster_gym.mechanics.scalars import add, each, flatten, where
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
 
-RECORD_ROWS = len(Record._fields)
-SITUATION_ROWS = len(Situation._fields)
-NEIGHBOUR_ROWS = 3
-FIXED_REPORT_ROWS = 32
-HEADING_SIN, HEADING_COS, FIRST_TERM, TERMS, FIRST_POSE, FIRST_RECORD, FIRST_SITUATION = 4, 5, 8, 6, 14, 22, 29
-ENDINGS = 3
-
 _REFERENCE = (0.0,) * REFERENCE_ROWS
 _POINT = (0.0,) * POINT_ROWS
 _RECORD = (0.0,) * RECORD_ROWS
@@ -37,104 +49,6 @@ _SITUATION = (0.0,) * SITUATION_ROWS
 _NEIGHBOUR = (0.0,) * NEIGHBOUR_ROWS
 
 teach(randomness)
-
-
-class World(NamedTuple):
-    """What a batch keeps from step to step."""
-
-    blocks: Any  # float64 (blocks, rows · LANES)
-    clocks: Any  # int64 (2, robots): control periods done, path
-    seeds: Any  # uint64 (2, robots): key, episode
-    slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
-    guide: Any  # Timetable or Courses
-    hull: Any  # Hull; this and the next two are None where there is no obstacle
-    obstacles: Any  # Obstacles
-    arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
-    substeps: Any
-    time_step: Any  # [s]
-
-
-class Views(NamedTuple):
-    """Where compiled code leaves what Python reads."""
-
-    observations: Any  # float32 (robots, size)
-    reports: Any  # float64 (quantities, robots)
-    results: Any  # float64 (3, robots): reward, terminated, truncated
-
-
-class Sizes(NamedTuple):
-    """As many items as there are casters, previewed points, and obstacles in an observation."""
-
-    casters: tuple[int, ...]
-    preview: tuple[int, ...]
-    nearest: tuple[int, ...]
-
-
-@register_jitable(**INLINE)
-def room_row(sizes: Sizes) -> int:
-    """Row of the room, see `caster_gym.engines.guarding`."""
-    return BODY_ROWS + 2 * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def wrench_row(sizes: Sizes) -> int:
-    """First row of the external wrench at C, in B."""
-    return room_row(sizes) + 1
-
-
-@register_jitable(**INLINE)
-def command_row(sizes: Sizes) -> int:
-    """First row of the motor commands."""
-    return wrench_row(sizes) + 3
-
-
-@register_jitable(**INLINE)
-def torque_row(sizes: Sizes) -> int:
-    """First row of the mean motor torques [N m]."""
-    return command_row(sizes) + 2 * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def record_row(sizes: Sizes) -> int:
-    """First row of the record of the control period."""
-    return torque_row(sizes) + 2 * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def reference_row(sizes: Sizes) -> int:
-    """First row of the reference, with the previewed points behind it."""
-    return record_row(sizes) + RECORD_ROWS
-
-
-@register_jitable(**INLINE)
-def situation_row(sizes: Sizes) -> int:
-    """First row of the situation."""
-    return reference_row(sizes) + REFERENCE_ROWS + POINT_ROWS * len(sizes.preview)
-
-
-@register_jitable(**INLINE)
-def nearest_row(sizes: Sizes) -> int:
-    """First row of the nearest obstacles."""
-    return situation_row(sizes) + SITUATION_ROWS
-
-
-@register_jitable(**INLINE)
-def observation_row(sizes: Sizes) -> int:
-    """First row of the observation."""
-    return nearest_row(sizes) + NEIGHBOUR_ROWS * len(sizes.nearest)
-
-
-@register_jitable(**INLINE)
-def report_row(sizes: Sizes) -> int:
-    """First row of the report."""
-    points = POINT_ROWS * len(sizes.preview) + NEIGHBOUR_ROWS * len(sizes.nearest)
-    return observation_row(sizes) + 13 + 4 * len(sizes.casters) + points
-
-
-@register_jitable(**INLINE)
-def parameter_row(sizes: Sizes) -> int:
-    """First row of the robot's parameters, the last ones."""
-    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters)
 
 
 @register_jitable(**INLINE)

@@ -11,7 +11,7 @@ from caster_gym.mechanics.actuation import conditioning
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import forward_dynamics
 from caster_gym.mechanics.ground import ground_force, traction_use, wheel_loads
-from caster_gym.mechanics.integration import State, pack_state
+from caster_gym.mechanics.integration import State, difference, pack_state
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
 from caster_gym.mechanics.scalars import (
@@ -193,11 +193,6 @@ def not_finite(state: State) -> Scalar:
     """1 if any number of the state is infinite or no number, else 0."""
     (doubt,) = total(each(difference, (), pack_state(state)))
     return where(doubt == 0.0, 0.0, 1.0)
-
-
-def difference(number: Scalar) -> tuple[Scalar]:
-    """0 for a finite number, else not a number."""
-    return (number - number,)
 
 
 def left_corridor(errors: Errors, corridor: Scalar) -> Scalar:

@@ -22,6 +22,11 @@ def pack_state(state: State) -> tuple[Scalar, ...]:
     return state.position + state.heading + state.twist + flatten(state.directions)
 
 
+def difference(number: Scalar) -> tuple[Scalar]:
+    """0 for a finite number, else not a number."""
+    return (number - number,)
+
+
 def unpack_state(flat: tuple[Scalar, ...]) -> State:
     """Inverse of `pack_state`."""
     return State(

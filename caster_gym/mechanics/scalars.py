@@ -58,6 +58,11 @@ def entry(table: Any, i: Any, j: Any) -> Any:
     return table[i][j]
 
 
+def memory(nothing: Scalar, count: int) -> Any:
+    """Room for so many scalars of a kind, each `nothing` at first; entries are read and set by their index."""
+    return [nothing] * count
+
+
 def minimum(a: Scalar, b: Scalar) -> Scalar:
     """The smaller one; b where a is not a number."""
     return where(a < b, a, b)

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,7 @@ class Viewer:
             return None
         if len(shown) != len(self._cells):
             self._divide(len(shown))
+        shown = [cell.drawable(scene) for cell, scene in zip(self._cells, shown, strict=True)]
         for cell, scene in zip(self._cells, shown, strict=True):
             cell.take(scene, self._floor, self.follow)
         self._canvas.copy_from(self._floor)
@@ -122,7 +124,7 @@ class Viewer:
             self._window = pygame.display.set_mode(self.size)
         self._window.blit(picture, (0, 0))
         pygame.display.flip()
-        if pygame.event.get(pygame.QUIT):
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):  # all are taken, so that none pile up
             self.close()
         self._clock.tick(self.fps)
 
@@ -135,6 +137,15 @@ class _Cell:
         self.view: View | None = None
         self._history = History()
         self._last: Scene | None = None
+
+    def drawable(self, scene: Scene) -> Scene:
+        """The scene, or the last one, failed, if this one holds numbers that cannot be drawn."""
+        numbers = (scene.pose, scene.twist, scene.directions, scene.torque, scene.ground_forces, scene.impulse)
+        if all(np.isfinite(part).all() for part in numbers):
+            return scene
+        if self._last is None:
+            raise ValueError(f"a robot whose pose is {scene.pose} cannot be drawn")
+        return replace(self._last, time=scene.time, failed=True)
 
     def take(self, scene: Scene, floor: Canvas, follow: float | None) -> None:
         """Take in a scene, and draw the floor where it has changed."""

@@ -45,8 +45,9 @@ class Stack:
             raise ValueError("this environment has been wrapped before: give all features to one call of wrap")
         self._engine, self._task, self.action_space = engine, task, space
         self._clocks = np.zeros(engine.count, dtype=np.int64)
-        self._seeds = np.zeros((len(features), engine.count), dtype=np.uint64)
-        self._coming = self._seeds.copy()  # of the episodes that the engine has started
+        # an array for each feature: a pickled or copied stack still shares them, as it would not share views of one
+        self._seeds = [np.zeros(engine.count, dtype=np.uint64) for _ in features]
+        self._coming = np.zeros((len(features), engine.count), dtype=np.uint64)  # of episodes that were started
         self._streams = [stream(place, getattr(feature, "kind", "")) for place, feature in enumerate(features)]
         self._runtimes = [self._started(i, feature) for i, feature in enumerate(features)]
         self._rewards = [one for one in self._runtimes if isinstance(one, RewardRuntime)]
@@ -78,7 +79,8 @@ class Stack:
 
     def begin(self, robots: NDArray[np.int64], observations: Observations, infos: Mapping[str, Any]) -> Observations:
         """What some robots show after their reset; observations are theirs, infos those of all robots."""
-        self._seeds[:, robots] = self._coming[:, robots]
+        for seeds, coming in zip(self._seeds, self._coming, strict=True):
+            seeds[robots] = coming[robots]
         self._clocks[robots] = 0
         quantities = _quantities(infos, {}, np.zeros(0, dtype=np.bool_))
         for runtime in self._runtimes:

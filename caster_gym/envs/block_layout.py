@@ -1,0 +1,120 @@
+"""How the quantities of a task lie in a block of robots, and what else a batch keeps.
+
+Rows of a block: state, room, wrench, motor commands, mean motor torques, record, reference, preview, situation, nearest
+obstacles, observation, report, robot parameters. The tuples in `Sizes` have an item per caster, per previewed point and
+per observed obstacle: their lengths are part of their types, so that all rows are constants of the compiled code.
+"""
+
+from typing import Any, NamedTuple
+
+from numba.extending import register_jitable
+
+from caster_gym.engines.lanes import BODY_ROWS
+from caster_gym.engines.numba_compiler import INLINE
+from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS
+from caster_gym.envs.tracking import Record, Situation
+
+RECORD_ROWS = len(Record._fields)
+SITUATION_ROWS = len(Situation._fields)
+NEIGHBOUR_ROWS = 3
+FIXED_REPORT_ROWS = 32
+HEADING_SIN, HEADING_COS, FIRST_TERM, TERMS, FIRST_POSE, FIRST_RECORD, FIRST_SITUATION = 4, 5, 8, 6, 14, 22, 29
+ENDINGS = 3
+
+
+class World(NamedTuple):
+    """What a batch keeps from step to step."""
+
+    blocks: Any  # float64 (blocks, rows · LANES)
+    clocks: Any  # int64 (2, robots): control periods done, path
+    seeds: Any  # uint64 (2, robots): key, episode
+    slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
+    guide: Any  # Timetable or Courses
+    hull: Any  # Hull; this and the next two are None where there is no obstacle
+    obstacles: Any  # Obstacles
+    arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
+    substeps: Any
+    time_step: Any  # [s]
+
+
+class Views(NamedTuple):
+    """Where compiled code leaves what Python reads."""
+
+    observations: Any  # float32 (robots, size)
+    reports: Any  # float64 (quantities, robots)
+    results: Any  # float64 (3, robots): reward, terminated, truncated
+
+
+class Sizes(NamedTuple):
+    """As many items as there are casters, previewed points, and obstacles in an observation."""
+
+    casters: tuple[int, ...]
+    preview: tuple[int, ...]
+    nearest: tuple[int, ...]
+
+
+@register_jitable(**INLINE)
+def room_row(sizes: Sizes) -> int:
+    """Row of the room, see `caster_gym.engines.guarding`."""
+    return BODY_ROWS + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def wrench_row(sizes: Sizes) -> int:
+    """First row of the external wrench at C, in B."""
+    return room_row(sizes) + 1
+
+
+@register_jitable(**INLINE)
+def command_row(sizes: Sizes) -> int:
+    """First row of the motor commands."""
+    return wrench_row(sizes) + 3
+
+
+@register_jitable(**INLINE)
+def torque_row(sizes: Sizes) -> int:
+    """First row of the mean motor torques [N m]."""
+    return command_row(sizes) + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def record_row(sizes: Sizes) -> int:
+    """First row of the record of the control period."""
+    return torque_row(sizes) + 2 * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
+def reference_row(sizes: Sizes) -> int:
+    """First row of the reference, with the previewed points behind it."""
+    return record_row(sizes) + RECORD_ROWS
+
+
+@register_jitable(**INLINE)
+def situation_row(sizes: Sizes) -> int:
+    """First row of the situation."""
+    return reference_row(sizes) + REFERENCE_ROWS + POINT_ROWS * len(sizes.preview)
+
+
+@register_jitable(**INLINE)
+def nearest_row(sizes: Sizes) -> int:
+    """First row of the nearest obstacles."""
+    return situation_row(sizes) + SITUATION_ROWS
+
+
+@register_jitable(**INLINE)
+def observation_row(sizes: Sizes) -> int:
+    """First row of the observation."""
+    return nearest_row(sizes) + NEIGHBOUR_ROWS * len(sizes.nearest)
+
+
+@register_jitable(**INLINE)
+def report_row(sizes: Sizes) -> int:
+    """First row of the report."""
+    points = POINT_ROWS * len(sizes.preview) + NEIGHBOUR_ROWS * len(sizes.nearest)
+    return observation_row(sizes) + 13 + 4 * len(sizes.casters) + points
+
+
+@register_jitable(**INLINE)
+def parameter_row(sizes: Sizes) -> int:
+    """First row of the robot's parameters, the last ones."""
+    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters)
