@@ -31,7 +31,7 @@ def worth_measuring(room: Scalar, v: Vector, h: Scalar, reach: Scalar) -> Any:
 
 
 @register_jitable(**INLINE)
-def settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, hull: Any) -> Any:
+def settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, reach: Any) -> Any:
     """Where a robot is after an ordinary step that would lead to `end`: its packed state, its room, and 1 if it went.
 
     A robot that may touch something stays where it is, with a room of −1; its step is to be taken with care. The way of
@@ -39,10 +39,18 @@ def settled(obstacles: Any, room: Any, state: Any, end: Any, h: Any, hull: Any) 
     """
     if obstacles is None:
         return pack_state(end), room, 1.0
-    left = room - h * (speed_bound(state.twist, hull.reach) + speed_bound(end.twist, hull.reach))
+    left = room - h * (speed_bound(state.twist, reach) + speed_bound(end.twist, reach))
     risky = left < CLOSE
     stays = each(where, (risky,), pack_state(state), pack_state(end))
     return stays, where(risky, -1.0, left), where(risky, 0.0, 1.0)
+
+
+@register_jitable(**INLINE)
+def reach_of(hull: Any) -> Any:
+    """Reach of the hull [m], 0 without one; taken out of it before a loop over lanes, which else is no SIMD loop."""
+    if hull is None:
+        return 0.0
+    return hull.reach
 
 
 @register_jitable(**INLINE)

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
-from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
+from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, reach_of, settled, worth_measuring
 from caster_gym.engines.lanes import (
     BODY_ROWS,
     LANES,
@@ -69,14 +69,14 @@ def _step_lanes(
     block: Any, lanes: int, here: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...]
 ) -> None:
     """One RK4 step of the first lanes of one block, of which the first `here` hold robots and the rest are spare."""
-    row = room_row(casters)
+    row, reach = room_row(casters), reach_of(hull)
     _measure(block, here, h, hull, obstacles, casters)
     for lane in range(lanes):
         state = read_state(block, lane, 0, casters)
         torques = read_pairs(block, lane, torque_row(casters), casters)
         robot = read_robot(block, lane, row + 1, casters)
         target = rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)
-        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, hull)
+        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, reach)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
     _take_care(block, here, h, hull, obstacles, casters)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, settled, worth_measuring
+from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, reach_of, settled, worth_measuring
 from caster_gym.engines.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
 from caster_gym.envs import randomness
@@ -133,7 +133,7 @@ def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, 
 @register_jitable(**INLINE)
 def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
     """Let robots, the first of the batch's in this block being `first`, move for a control period."""
-    rows, room_at, h = torque_row(sizes), room_row(sizes), world.time_step
+    rows, room_at, h, reach = torque_row(sizes), room_row(sizes), world.time_step, reach_of(world.hull)
     share = 1.0 / world.substeps
     for row in range(rows, reference_row(sizes)):
         for lane in range(lanes):
@@ -147,7 +147,7 @@ def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: S
             robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
             target, drive = driven_step(state, commands, wrench, h, robot)
             room = block[room_at * LANES + lane]
-            end, room, went = settled(world.obstacles, room, state, target, h, world.hull)
+            end, room, went = settled(world.obstacles, room, state, target, h, reach)
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
             write(block, lane, 0, end)
             write(block, lane, rows, add(read(block, lane, rows, mean), mean))
