@@ -111,7 +111,10 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         return outcome.observations.copy(), outcome.rewards, outcome.terminated, outcome.truncated, infos
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]  # Gymnasium's type has tuples of frames
-        """The first robots of the batch in a grid: an image (height, width, 3), or a window, as `render_mode` says."""
+        """The first 16 robots in a grid: one image (height, width, 3), or a window, as `render_mode` says.
+
+        Gymnasium's RecordVideo for batches asks for a frame of each robot, and so cannot film this.
+        """
         if not self._started:
             raise RuntimeError("reset every robot before they are drawn")
         return self._easel.show(range(min(self.num_envs, DRAWN)))
