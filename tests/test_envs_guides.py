@@ -157,7 +157,7 @@ def test_the_share_is_the_way_over_that_at_the_speed_limit_and_at_most_one():
         now = info["progress"]
         assert info["progress_share"] == pytest.approx(1.0, abs=1e-5)
         assert info["progress_share"] <= 1.0
-        assert info["reward_terms"]["progress"] == pytest.approx(0.4, abs=1e-5)
+        assert info["reward_terms"]["progress"] == pytest.approx(0.2, abs=1e-5)
 
 
 PATHS = [

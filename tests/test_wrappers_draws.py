@@ -43,8 +43,8 @@ def test_normal_numbers_are_normal():
 
 
 def test_the_most_extreme_bits_give_finite_numbers(monkeypatch):
-    for bits in (0, 2**64 - 1):
-        monkeypatch.setattr("caster_gym.wrappers.draws.mix", lambda x, bits=bits: np.full_like(x, bits))
+    for extreme in (0, 2**64 - 1):
+        monkeypatch.setattr("caster_gym.wrappers.draws.bits", lambda x, _, extreme=extreme: np.full_like(x, extreme))
         assert np.abs(normals(seeds(1), np.zeros(1, np.int64))).item() < 9.0  # Φ⁻¹(2⁻⁵³) is −8.2
 
 

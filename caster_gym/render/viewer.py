@@ -139,12 +139,10 @@ class _Cell:
         self._last: Scene | None = None
 
     def drawable(self, scene: Scene) -> Scene:
-        """The scene, or the last one, failed, if this one holds numbers that cannot be drawn."""
+        """The scene, or the last one, failed, if this one holds numbers that are not finite."""
         numbers = (scene.pose, scene.twist, scene.directions, scene.torque, scene.ground_forces, scene.impulse)
-        if all(np.isfinite(part).all() for part in numbers):
+        if self._last is None or all(np.isfinite(part).all() for part in numbers):
             return scene
-        if self._last is None:
-            raise ValueError(f"a robot whose pose is {scene.pose} cannot be drawn")
         return replace(self._last, time=scene.time, failed=True)
 
     def take(self, scene: Scene, floor: Canvas, follow: float | None) -> None:
