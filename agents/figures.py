@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from caster_gym.envs.guides import Courses
 from caster_gym.envs.task_engine import Plan
+from caster_gym.render.palette import SERIES as COLOURS
 
 from .evaluation import Episodes
 from .measuring import Printed, shown
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-# Okabe and Ito's colours, distinguishable with colour-blind eyes
-COLOURS = ("#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#F0E442", "#000000")
 OBSTACLE = "0.75"
 MOST_PATHS = 6
 MAGNIFIED = 20.0  # how much larger tracking errors are drawn

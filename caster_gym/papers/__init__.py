@@ -1,0 +1,1 @@
+"""What two papers on this robot print, beside what this package computes."""

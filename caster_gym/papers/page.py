@@ -1,0 +1,144 @@
+"""A page that puts what a paper prints beside what we compute: numbers with verdicts, tables, figures, differences.
+
+A paper's page is made of sections, each built by a function of its own; `write_page` puts them down as
+
+    OUT/NAME.md                  the page
+    OUT/NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict
+    OUT/NAME/differences.csv     where the paper and we differ, with the evidence
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LONGEST_TABLE = 40  # rows that a page shows; a longer table is a file only
+DOTS_PER_INCH = 110
+
+
+class Check(NamedTuple):
+    """One thing that a paper prints, beside ours."""
+
+    what: str
+    printed: str
+    ours: str
+    agrees: bool
+    remark: str = ""  # why they differ, or what the agreement rests on
+
+
+class Table(NamedTuple):
+    """Rows of words and numbers; always a file, and on the page if it is short."""
+
+    name: str  # of its file, without .csv; unique in a paper
+    caption: str
+    columns: tuple[str, ...]
+    rows: Sequence[Sequence[str | float]]
+
+
+class Picture(NamedTuple):
+    """A drawn figure."""
+
+    name: str  # of its file, without .png; unique in a paper
+    caption: str
+    figure: "Figure"
+
+
+class Difference(NamedTuple):
+    """A place where a paper and we differ."""
+
+    tag: str  # E1, E2, …
+    where: str
+    printed: str
+    ours: str
+    evidence: str  # what was measured that decides
+
+
+class Section(NamedTuple):
+    """A part of a page."""
+
+    title: str
+    text: str  # Markdown
+    checks: tuple[Check, ...] = ()
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    differences: tuple[Difference, ...] = ()
+
+
+class Paper(NamedTuple):
+    """A paper and the functions that build the sections of its page."""
+
+    name: str
+    title: str
+    reference: str  # authors, title, journal
+    parts: tuple[tuple[str, Callable[[], Section]], ...]  # what is being computed, for a progress bar; and how
+
+
+def check_number(what: str, printed: str, ours: float, tolerance: float | None = None, remark: str = "") -> Check:
+    """Compare a number with its printed digits; agreement is within half a unit of the last, or a given tolerance."""
+    allowed = _half_unit(printed) if tolerance is None else tolerance
+    agrees = math.isfinite(ours) and abs(ours - float(printed)) <= allowed * (1.0 + 1e-9)
+    digits = max(0, -math.floor(math.log10(2.0 * _half_unit(printed)) + 0.5)) + 1
+    return Check(what, printed, f"{ours:.{digits}f}", agrees, remark)
+
+
+def write_page(paper: Paper, sections: Sequence[Section], out: Path) -> None:
+    """Put a page, its figures and its tables in a folder. Raises ValueError if two of them have the same name."""
+    folder = out / paper.name
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [t.name for s in sections for t in s.tables] + [p.name for s in sections for p in s.pictures]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"two tables or figures of {paper.name} are called {twice[0]!r}")
+    for section in sections:
+        for table in section.tables:
+            _write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
+        for picture in section.pictures:
+            picture.figure.savefig(folder / f"{picture.name}.png", dpi=DOTS_PER_INCH)
+    checks = [check for section in sections for check in section.checks]
+    _write_csv(folder / "checks.csv", Check._fields, checks)
+    _write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
+    (out / f"{paper.name}.md").write_text(_page(paper, sections, checks), encoding="utf-8")
+
+
+def _page(paper: Paper, sections: Sequence[Section], checks: Sequence[Check]) -> str:
+    agreeing = sum(check.agrees for check in checks)
+    summary = f"{agreeing} of {len(checks)} printed numbers and statements agree; the reason stands beside each other."
+    made = f"Made by `caster-gym reproduce {paper.name}`."
+    parts = [f"# {paper.title}", paper.reference, f"{summary} {made}"]
+    for section in sections:
+        parts += [f"## {section.title}", section.text.strip()]
+        if section.checks:
+            rows = [(c.what, c.printed, c.ours, "pass" if c.agrees else "**fail**", c.remark) for c in section.checks]
+            parts.append(markdown_table(("what", "printed", "ours", "verdict", "remark"), rows))
+        for table in section.tables:
+            link = f"[{table.name}.csv]({paper.name}/{table.name}.csv)"
+            parts.append(f"{table.caption} ({link})")
+            if len(table.rows) <= LONGEST_TABLE:
+                parts.append(markdown_table(table.columns, table.rows))
+        for picture in section.pictures:
+            parts += [f"![{picture.caption}]({paper.name}/{picture.name}.png)", f"*{picture.caption}*"]
+    return "\n\n".join(parts) + "\n"
+
+
+def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]]) -> str:
+    """A table in Markdown; numbers with four significant digits."""
+    lines = [[*columns], ["---"] * len(columns)]
+    lines += [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def _half_unit(printed: str) -> float:
+    """Half a unit of the last printed digit of a number."""
+    mantissa, _, exponent = printed.lower().partition("e")
+    return 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+
+
+def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
