@@ -1,6 +1,5 @@
-"""The command caster-gym: train, evaluate, benchmark, watch."""
+"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, export."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from tqdm import tqdm
 
 from caster_gym.configuration import parse_yaml
 
+from .run_folder import prepare
 from .settings import (
     BenchmarkSettings,
     ComputedTorqueSettings,
@@ -26,7 +26,7 @@ app = typer.Typer(
     help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
 )
 
-MARK = ".caster-gym"  # stands in each folder that --overwrite may delete
+PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 
 Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
@@ -55,7 +55,7 @@ def train(
         if isinstance(settings, ComputedTorqueSettings):
             raise ValueError(f"agent {agent!r} does not learn; compare it with `caster-gym benchmark`")
         tasks = read_settings(TaskSettings, "tasks", task)
-        _prepare(out, overwrite)
+        prepare(out, overwrite)
         with tqdm(total=settings.steps, desc=f"{agent} seed {seed}", unit="step", unit_scale=True) as bar:
 
             def report(steps: int, verdict: str) -> None:
@@ -91,7 +91,7 @@ def evaluate(
         test = test_batch(tasks, tasks.test, starts)
         agent = ready_agent(policy, tasks, test)
         contender = Contender(agent.name, agent, None)
-        _prepare(out, overwrite, kept=Path(policy))
+        prepare(out, overwrite, kept=Path(policy))
         results, episodes = compare([contender], test, settings)
         text = table(results, settings.confidence)
         write_episodes(out / "episodes.csv", results)
@@ -116,7 +116,7 @@ def benchmark(
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, _parsed(change))
-        _prepare(out, overwrite)
+        prepare(out, overwrite)
         typer.echo(run_benchmark(comparison, out))
         typer.echo(f"Results, policies and figures are in {out}.")
 
@@ -147,6 +147,52 @@ def watch(
             typer.echo(f"{frames} frames are in {save}.")
 
 
+@app.command()
+def reproduce(
+    paper: Annotated[str, typer.Argument(help="chung2008 or kim2001.")],
+    out: Annotated[Path, typer.Option(help="Folder for the page PAPER.md and its folder PAPER.")] = Path("runs/papers"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that page and its folder.")] = False,
+) -> None:
+    """Compute everything that a paper computes: figures, tables, and a page with each printed number beside ours."""
+    with _plain_errors():
+        from .reproduction import find_paper
+        from .reproduction import reproduce as run
+
+        with tqdm(total=len(find_paper(paper).parts), desc=paper, bar_format=PARTS_BAR) as bar:
+
+            def report(work: str, done: int) -> None:
+                bar.n = done
+                bar.set_postfix_str(work)
+
+            verdict = run(paper, out, overwrite, report)
+        share = f"{verdict.agreeing} of {verdict.compared}"
+        typer.echo(f"{share} printed numbers and statements agree; {out / paper}.md shows all.")
+        if verdict.unexplained:
+            raise ValueError(f"no reason is known why these differ: {'; '.join(verdict.unexplained)}")
+
+
+@app.command()
+def export(
+    robot: Annotated[str, typer.Argument(help="Name of a robot, or path of its YAML file.")],
+    mjcf: Annotated[Path, typer.Option(help="File for the robot as a MuJoCo model, such as robot.xml.")],
+    time_step: Annotated[float, typer.Option(help="Of the model [s]; MuJoCo's slip falls in proportion to it.")] = 2e-3,
+    friction: Annotated[
+        float, typer.Option(help="Between wheels and floor; a great one comes nearest to rolling.")
+    ] = 5.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a robot as a model for MuJoCo (MJCF): bodies, joints, gears and motors, wheels that roll by friction."""
+    with _plain_errors():
+        from caster_gym.export.mjcf import mjcf as model
+        from caster_gym.robot import load_robot
+
+        text = model(load_robot(robot), time_step, friction)
+        if mjcf.exists() and not overwrite:
+            raise ValueError(f"{mjcf} is there already; choose another --mjcf, or --overwrite it")
+        mjcf.write_text(text, encoding="utf-8")
+        typer.echo(f"The model is in {mjcf}.")
+
+
 def _parsed(changes: list[str] | None) -> dict[str, Any]:
     """Settings from KEY=VALUE, values read as YAML."""
     parsed = {}
@@ -156,21 +202,6 @@ def _parsed(changes: list[str] | None) -> dict[str, Any]:
             raise ValueError(f"--set needs KEY=VALUE, got {change!r}")
         parsed[key] = parse_yaml(value, f"--set {change}")
     return parsed
-
-
-def _prepare(folder: Path, overwrite: bool, kept: Path | None = None) -> None:
-    """An empty folder with our mark; a full one is emptied only if told to, if it has the mark, and without `kept`."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        if not overwrite:
-            raise ValueError(f"{folder} is not empty; choose another --out, or --overwrite it")
-        if not (folder / MARK).is_file():
-            raise ValueError(f"{folder} is not overwritten, since it does not hold results of caster-gym alone")
-        for place in (Path.cwd(), *([kept] if kept else [])):
-            if place.resolve().is_relative_to(folder.resolve()):
-                raise ValueError(f"{folder} is not overwritten, since {place} lies in it")
-        shutil.rmtree(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / MARK).touch()
 
 
 @contextmanager

@@ -28,7 +28,8 @@ from caster_gym.arena.arena import Pillar
 from caster_gym.arena.packing import surroundings
 from caster_gym.engines.numba_fleet import Fleet
 from caster_gym.engines.threads import get_threads, set_threads
-from scripts.mujoco_peer import joint_indices, mjcf
+from caster_gym.export.mjcf import mjcf
+from scripts.mujoco_peer import joint_indices
 
 ENVIRONMENT = "caster_gym:CasterTrack-v0"
 FOLLOW = "caster_gym:CasterFollow-v0"

@@ -6,7 +6,8 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from caster_gym.agents.cli import MARK, app
+from caster_gym.agents.cli import app
+from caster_gym.agents.run_folder import MARK
 
 RANDOM = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3}
 TASK = {

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from caster_gym import Model, Robot, load_robot
-from scripts.mujoco_peer import joint_indices, mjcf, path_length, simulate, without_dry_friction
+from caster_gym.export.mjcf import mjcf
+from scripts.mujoco_peer import joint_indices, path_length, simulate, without_dry_friction
 from tests.random_robots import random_robot
 
 STEP = 2e-3  # [s] of the equations

@@ -1,15 +1,16 @@
 """A page that puts what a paper prints beside what we compute: numbers with verdicts, tables, figures, differences.
 
-A paper's page is made of sections, each built by a function of its own; `write_page` puts them down as
+A paper's page is made of sections, each built by a function of its own. The files are
 
-    OUT/NAME.md                  the page
-    OUT/NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict
-    OUT/NAME/differences.csv     where the paper and we differ, with the evidence
+    NAME.md                  the page
+    NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict
+    NAME/differences.csv     where the paper and we differ, with the evidence
+    differences.md           all differences of all papers whose folders are there
 """
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -68,15 +69,6 @@ class Section(NamedTuple):
     differences: tuple[Difference, ...] = ()
 
 
-class Paper(NamedTuple):
-    """A paper and the functions that build the sections of its page."""
-
-    name: str
-    title: str
-    reference: str  # authors, title, journal
-    parts: tuple[tuple[str, Callable[[], Section]], ...]  # what is being computed, for a progress bar; and how
-
-
 def check_number(what: str, printed: str, ours: float, tolerance: float | None = None, remark: str = "") -> Check:
     """Compare a number with its printed digits; agreement is within half a unit of the last, or a given tolerance."""
     allowed = _half_unit(printed) if tolerance is None else tolerance
@@ -85,14 +77,15 @@ def check_number(what: str, printed: str, ours: float, tolerance: float | None =
     return Check(what, printed, f"{ours:.{digits}f}", agrees, remark)
 
 
-def write_page(paper: Paper, sections: Sequence[Section], out: Path) -> None:
-    """Put a page, its figures and its tables in a folder. Raises ValueError if two of them have the same name."""
-    folder = out / paper.name
-    folder.mkdir(parents=True, exist_ok=True)
-    names = [t.name for s in sections for t in s.tables] + [p.name for s in sections for p in s.pictures]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ValueError(f"two tables or figures of {paper.name} are called {twice[0]!r}")
+def write_page(name: str, title: str, reference: str, sections: Sequence[Section], folder: Path) -> str:
+    """Put figures and tables of a paper in a folder; returns the page that stands beside the folder.
+
+    Raises ValueError if two tables or two figures have the same name.
+    """
+    for names in ([t.name for s in sections for t in s.tables], [p.name for s in sections for p in s.pictures]):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"two tables or figures of {name} are called {twice[0]!r}")
     for section in sections:
         for table in section.tables:
             _write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
@@ -101,26 +94,44 @@ def write_page(paper: Paper, sections: Sequence[Section], out: Path) -> None:
     checks = [check for section in sections for check in section.checks]
     _write_csv(folder / "checks.csv", Check._fields, checks)
     _write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
-    (out / f"{paper.name}.md").write_text(_page(paper, sections, checks), encoding="utf-8")
+    return _page(name, title, reference, sections, checks)
 
 
-def _page(paper: Paper, sections: Sequence[Section], checks: Sequence[Check]) -> str:
+def write_differences(out: Path, names: Sequence[str]) -> None:
+    """OUT/differences.md: where each paper and we differ, of all papers whose folders are there."""
+    parts = [
+        "# Where the papers and we differ",
+        "Each with the evidence that decides, as measured by `caster-gym reproduce`.",
+    ]
+    for name in names:
+        file = out / name / "differences.csv"
+        if file.is_file():
+            with file.open(encoding="utf-8", newline="") as lines:
+                _, *rows = csv.reader(lines)
+            rows.sort(key=lambda row: int(row[0].removeprefix("E")))
+            columns = ("", "where", "as printed", "correct", "evidence")
+            parts += [f"## [{name}]({name}.md)", markdown_table(columns, rows)]
+    (out / "differences.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _page(name: str, title: str, reference: str, sections: Sequence[Section], checks: Sequence[Check]) -> str:
     agreeing = sum(check.agrees for check in checks)
-    summary = f"{agreeing} of {len(checks)} printed numbers and statements agree; the reason stands beside each other."
-    made = f"Made by `caster-gym reproduce {paper.name}`."
-    parts = [f"# {paper.title}", paper.reference, f"{summary} {made}"]
+    summary = (
+        f"{agreeing} of {len(checks)} printed numbers and statements agree; the reason stands beside each other, and "
+        f"[differences.md](differences.md) lists them with the evidence. Made by `caster-gym reproduce {name}`."
+    )
+    parts = [f"# {title}", reference, summary]
     for section in sections:
         parts += [f"## {section.title}", section.text.strip()]
         if section.checks:
             rows = [(c.what, c.printed, c.ours, "pass" if c.agrees else "**fail**", c.remark) for c in section.checks]
             parts.append(markdown_table(("what", "printed", "ours", "verdict", "remark"), rows))
         for table in section.tables:
-            link = f"[{table.name}.csv]({paper.name}/{table.name}.csv)"
-            parts.append(f"{table.caption} ({link})")
+            parts.append(f"{table.caption} ([{table.name}.csv]({name}/{table.name}.csv))")
             if len(table.rows) <= LONGEST_TABLE:
                 parts.append(markdown_table(table.columns, table.rows))
         for picture in section.pictures:
-            parts += [f"![{picture.caption}]({paper.name}/{picture.name}.png)", f"*{picture.caption}*"]
+            parts += [f"![{picture.caption}]({name}/{picture.name}.png)", f"*{picture.caption}*"]
     return "\n\n".join(parts) + "\n"
 
 

@@ -1,0 +1,94 @@
+"""Both papers, reproduced: every section of their pages, built one after the other and put down at once."""
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from caster_gym.configuration import did_you_mean
+from caster_gym.papers.page import Section, write_differences, write_page
+
+from .provenance import write_provenance
+from .run_folder import check_free, staged
+
+
+class Paper(NamedTuple):
+    """A paper and where the sections of its page are built."""
+
+    title: str
+    reference: str
+    parts: dict[str, str]  # what is being computed -> module:function
+
+
+PAPERS = {
+    "chung2008": Paper(
+        "Singularity-free dynamics of a robot on three casters: chung2008",
+        "J. H. Chung, B.-J. Yi, W. K. Kim and S.-Y. Han, *Singularity-Free Dynamic Modeling Including Wheel Dynamics "
+        "for an Omni-Directional Mobile Robot with Three Caster Wheels*, International Journal of Control, Automation, "
+        "and Systems 6(1), 2008.",
+        {
+            "kinematics": "caster_gym.papers.chung2008_kinematics:section",
+            "accelerations": "caster_gym.papers.chung2008_hessians:section",
+            "orthogonal complement": "caster_gym.papers.chung2008_complement:section",
+            "operational forces": "caster_gym.papers.chung2008_forces:section",
+            "wheel mass": "caster_gym.papers.chung2008_wheel_mass:section",
+            "missing term": "caster_gym.papers.chung2008_missing_term:section",
+            "incomplete models": "caster_gym.agents.incomplete_models:section",
+            "impulse": "caster_gym.papers.chung2008_impulse:section",
+        },
+    ),
+    "kim2001": Paper(
+        "Singularities and isotropy of a robot on three casters: kim2001",
+        "W. Kim, D. H. Kim, B.-J. Yi, B.-J. You and S.-I. Yang, *Design of an Omni-directional Mobile Robot with 3 "
+        "Caster Wheels*, Transactions on Control, Automation and Systems Engineering 3, 2001.",
+        {
+            "kinematics": "caster_gym.papers.kim2001_kinematics:section",
+            "singularities": "caster_gym.papers.kim2001_singularity:section",
+            "sets of joints": "caster_gym.papers.kim2001_joint_sets:section",
+            "isotropy": "caster_gym.papers.kim2001_isotropy:section",
+        },
+    ),
+}
+
+
+class Verdict(NamedTuple):
+    """How many printed numbers and statements agree, and the names of those that differ without a reason."""
+
+    agreeing: int
+    compared: int
+    unexplained: tuple[str, ...]
+
+
+def find_paper(name: str) -> Paper:
+    """The paper of a name; raises ValueError that names those that there are."""
+    if name not in PAPERS:
+        raise ValueError(f"unknown paper {name!r}; {did_you_mean(name, PAPERS)}")
+    return PAPERS[name]
+
+
+def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int], None]) -> Verdict:
+    """Compute everything of a paper, then put OUT/NAME.md and the folder OUT/NAME in their places.
+
+    report is told what comes next and how many parts are done. What was there before stays until all is computed.
+    """
+    paper = find_paper(name)
+    check_free(out / name, overwrite)
+    sections = []
+    for done, (work, place) in enumerate(paper.parts.items()):
+        report(work, done)
+        sections.append(_build(place))
+    report("done", len(sections))
+    with staged(out / name, overwrite) as fresh:
+        page = write_page(name, paper.title, paper.reference, sections, fresh)
+        write_provenance(fresh, paper=name)
+        (out / f"{name}.md").write_text(page, encoding="utf-8")
+    write_differences(out, tuple(PAPERS))
+    checks = [check for section in sections for check in section.checks]
+    unexplained = tuple(check.what for check in checks if not check.agrees and not check.remark)
+    return Verdict(sum(check.agrees for check in checks), len(checks), unexplained)
+
+
+def _build(place: str) -> Section:
+    module, function = place.split(":")
+    section: Section = getattr(import_module(module), function)()
+    return section

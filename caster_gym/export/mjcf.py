@@ -1,0 +1,145 @@
+"""A robot as a model for MuJoCo (MJCF): rigid bodies, spheres for wheels, rolling by contact friction.
+
+MuJoCo knows nothing of casters: it holds the bodies together by joints and the wheels on the floor by friction, which
+its solver softens over a few time steps. So it slips a little, and less with every smaller time step; the limit is
+rolling without slip, the equations of caster_gym.
+
+The platform slides in x, y and z and turns about the vertical: it cannot tip, the slide in z lets its weight press the
+wheels on the floor. Rotor inertias, damping and dry friction sit at the joints, as in the robot's file. A motor acts on
+a tendon whose length is what the motor has turned, by the gear of its caster.
+"""
+
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+from caster_gym.mechanics.parameters import GRAVITY
+from caster_gym.robot import Caster, Footprint, Motor, Robot
+
+FRICTION = 5.0  # [-] more than any floor has, so that no wheel breaks away
+FRICTION_STIFFNESS = 100.0  # [-] of friction over that of the normal force: less creep under load
+CONTACT_STEPS = 2.0  # time constant of the contact in time steps, the stiffest that MuJoCo accepts
+DRAWN_HEIGHT = 0.05  # [m] of the platform, which has none in the robot's file
+_SEEN = 'contype="0" conaffinity="0" mass="0"'  # drawn only
+
+
+def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
+    """The robot as MJCF, with one motor for each joint of `robot.driven`, in that order.
+
+    Motors take torques [N m] within their greatest; that these fall with speed is left to who drives them. time_step in
+    s; friction between wheels and floor. Raises ValueError for masses and inertias that no solid body can have.
+    """
+    if not time_step > 0.0:
+        raise ValueError(f"time_step must be positive, got {time_step:g} s")
+    if not friction > 0.0:
+        raise ValueError(f"friction must be positive, got {friction:g}")
+    for number, caster in enumerate(robot.casters, start=1):
+        _check_solid(number, caster)
+    casters = "".join(_caster_body(number, caster) for number, caster in enumerate(robot.casters, start=1))
+    tendons = "".join(_tendons(number, caster) for number, caster in enumerate(robot.casters, start=1))
+    all_motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
+    motors = "".join(
+        _motor(joint, motor) for joint, motor in zip(robot.joints, all_motors, strict=True) if joint in robot.driven
+    )
+    p = robot.platform
+    top = max(caster.radius for caster in robot.casters) + DRAWN_HEIGHT
+    asset, outline = _outline(p.footprint, top)
+    return f"""<mujoco model={quoteattr(robot.name)}>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{_numbers(time_step)}" integrator="implicitfast" cone="elliptic"
+          impratio="{_numbers(FRICTION_STIFFNESS)}"
+          solver="Newton" tolerance="1e-14" iterations="100" gravity="0 0 {_numbers(-GRAVITY)}"/>
+  <default>
+    <geom condim="3" friction="{_numbers(friction)} 0 0" solref="{_numbers(CONTACT_STEPS * time_step)} 1"/>
+  </default>{asset}
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom name="floor" type="plane" size="0 0 1" contype="1" conaffinity="2" rgba="0.95 0.95 0.96 1"/>
+    <body name="platform">
+      <joint name="x" type="slide" axis="1 0 0"/>
+      <joint name="y" type="slide" axis="0 1 0"/>
+      <joint name="z" type="slide" axis="0 0 1"/>
+      <joint name="yaw" type="hinge" axis="0 0 1"/>
+      {_inertial(p.mass, (*p.com, 0.0), (p.inertia, p.inertia, p.inertia))}
+      {outline}{casters}
+    </body>
+  </worldbody>
+  <tendon>{tendons}
+  </tendon>
+  <actuator>{motors}
+  </actuator>
+</mujoco>
+"""
+
+
+def _outline(footprint: Footprint, top: float) -> tuple[str, str]:
+    """The platform to be seen: an asset, if it needs one, and its shape."""
+    look = f'{_SEEN} rgba="0.2 0.36 0.55 0.5"'
+    if footprint.disc is not None:
+        size = _numbers(footprint.disc, 0.5 * DRAWN_HEIGHT)
+        return "", f'<geom type="cylinder" size="{size}" pos="0 0 {_numbers(top)}" {look}/>'
+    corners = footprint.polygon or ()
+    low, high = top - 0.5 * DRAWN_HEIGHT, top + 0.5 * DRAWN_HEIGHT
+    vertices = " ".join(_numbers(x, y, z) for z in (low, high) for x, y in corners)
+    asset = f'\n  <asset><mesh name="platform" inertia="shell" vertex="{vertices}"/></asset>'
+    return asset, f'<geom type="mesh" mesh="platform" {look}/>'
+
+
+def _caster_body(number: int, caster: Caster) -> str:
+    """Steering link and wheel; the link's x-axis is the rolling direction, its origin the pivot at wheel height."""
+    link, wheel, (behind, left) = caster.link, caster.wheel, caster.link.com
+    centre = _numbers(-caster.trail, caster.offset, 0.0)
+    width = _numbers(caster.radius, 0.2 * caster.radius)
+    return f"""
+      <body name="link_{number}" pos="{_numbers(caster.x, caster.y, caster.radius)}">
+        {_hinge(f"steer_{number}", "0 0 1", caster.steer)}
+        {_inertial(link.mass, (-behind, left, 0.0), (link.inertia, link.inertia, link.inertia))}
+        <geom type="capsule" fromto="0 0 0 {centre}" size="{_numbers(0.15 * caster.radius)}" {_SEEN}/>
+        <body name="wheel_{number}" pos="{centre}">
+          {_hinge(f"roll_{number}", "0 1 0", caster.roll)}
+          {_inertial(wheel.mass, (0.0, 0.0, 0.0), (wheel.yaw_inertia, wheel.spin_inertia, wheel.yaw_inertia))}
+          <geom type="sphere" size="{_numbers(caster.radius)}" contype="2" conaffinity="1" group="3"/>
+          <geom type="cylinder" size="{width}" euler="1.5707963267948966 0 0" rgba="0.15 0.17 0.2 1" {_SEEN}/>
+        </body>
+      </body>"""
+
+
+def _hinge(name: str, axis: str, motor: Motor) -> str:
+    friction = f'damping="{_numbers(motor.viscous)}" frictionloss="{_numbers(motor.coulomb)}"'
+    return f'<joint name="{name}" type="hinge" axis="{axis}" armature="{_numbers(motor.armature)}" {friction}/>'
+
+
+def _inertial(mass: float, position: Sequence[float], diagonal: Sequence[float]) -> str:
+    return f'<inertial mass="{_numbers(mass)}" pos="{_numbers(*position)}" diaginertia="{_numbers(*diagonal)}"/>'
+
+
+def _tendons(number: int, caster: Caster) -> str:
+    """What each motor has turned, and the wheel's yaw over ground, the sum of the platform's yaw and the steering."""
+    turned = "".join(
+        f'\n    <fixed name="motor_{kind}_{number}"><joint joint="roll_{number}" coef="{_numbers(roll)}"/>'
+        f'<joint joint="steer_{number}" coef="{_numbers(steer)}"/></fixed>'
+        for kind, (roll, steer) in zip(("roll", "steer"), caster.gear, strict=True)
+    )
+    joints = f'<joint joint="yaw" coef="1"/><joint joint="steer_{number}" coef="1"/>'
+    return f'{turned}\n    <fixed name="yaw_{number}" damping="{_numbers(caster.scrub)}">{joints}</fixed>'
+
+
+def _motor(joint: str, motor: Motor) -> str:
+    span = f'ctrllimited="true" ctrlrange="{_numbers(-motor.max_torque, motor.max_torque)}"'
+    return f'\n    <motor name="{joint}" tendon="motor_{joint}" {span}/>'
+
+
+def _check_solid(number: int, caster: Caster) -> None:
+    """Refuse what MuJoCo would: bodies without mass, and a wheel flatter than a disc."""
+    wheel, link = caster.wheel, caster.link
+    for name, value in (("wheel.mass", wheel.mass), ("wheel.yaw_inertia", wheel.yaw_inertia), ("link.mass", link.mass)):
+        if value <= 0.0:
+            raise ValueError(f"caster {number}: {name} must be positive for a model of solid bodies, got {value:g}")
+    if wheel.spin_inertia > 2.0 * wheel.yaw_inertia * (1.0 + 1e-9):
+        raise ValueError(
+            f"caster {number}: a solid wheel has a spin_inertia of at most twice its yaw_inertia, "
+            f"got {wheel.spin_inertia:g} and {wheel.yaw_inertia:g} kg m²"
+        )
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(f"{value:.17g}" for value in values)

@@ -1,0 +1,102 @@
+"""A page says what agrees, what does not, and why."""
+
+import csv
+
+import pytest
+
+from caster_gym.papers.drawing import draw_robot, new_figure
+from caster_gym.papers.page import (
+    Check,
+    Difference,
+    Picture,
+    Section,
+    Table,
+    check_number,
+    markdown_table,
+    write_differences,
+    write_page,
+)
+from caster_gym.robot import load_robot
+
+
+@pytest.mark.parametrize(
+    ("printed", "ours", "agrees", "shown"),
+    [
+        ("5.4329", 5.43294, True, "5.43294"),
+        ("5.4329", 5.43296, False, "5.43296"),
+        ("-0.00078", -0.000784, True, "-0.000784"),
+        ("-0.00078", 0.00078, False, "0.000780"),
+        ("10", 10.4, True, "10.4"),
+        ("2.604e-6", 2.6043e-6, True, "0.0000026043"),
+        ("0.37", float("nan"), False, "nan"),
+    ],
+)
+def test_a_printed_number_agrees_within_half_a_unit_of_its_last_digit(printed, ours, agrees, shown):
+    assert check_number("it", printed, ours) == Check("it", printed, shown, agrees)
+
+
+def test_a_tolerance_may_be_given():
+    assert check_number("it", "5.4329", 5.4331, tolerance=2e-4).agrees
+    assert not check_number("it", "5.4329", 5.4332, tolerance=2e-4).agrees
+
+
+def section(name="curve", tag="E3"):
+    return Section(
+        "Forces",
+        "What is computed.",
+        checks=(check_number("(1)", "3", 3.0), Check("(2)", "always", "sometimes", False, f"{tag}: not when it rains")),
+        tables=(Table(name, "How it falls.", ("speed", "error"), [(1.0, 0.12345678), (2.0, "none | at all")]),),
+        pictures=(Picture(name, "It falls.", new_figure()),),
+        differences=(Difference(tag, "(2)", "always", "sometimes", "it rained"),),
+    )
+
+
+def test_page_holds_verdicts_tables_and_figures(tmp_path):
+    page = write_page("paper", "A paper", "Somebody, 2001.", [section()], tmp_path)
+    assert "1 of 2 printed numbers and statements agree" in page
+    assert "| (2) | always | sometimes | **fail** | E3: not when it rains |" in page
+    assert "| 1 | 0.1235 |\n| 2 | none \\| at all |" in page
+    assert "![It falls.](paper/curve.png)" in page
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
+    with (tmp_path / "curve.csv").open(encoding="utf-8", newline="") as file:
+        assert list(csv.reader(file)) == [["speed", "error"], ["1.0", "0.12345678"], ["2.0", "none | at all"]]
+
+
+def test_a_long_table_is_a_file_alone(tmp_path):
+    long = Section("Long", "", tables=(Table("long", "All.", ("n",), [(float(n),) for n in range(100)]),))
+    page = write_page("paper", "A paper", "", [long], tmp_path)
+    assert "(paper/long.csv)" in page
+    assert "| 7 |" not in page
+
+
+def test_no_table_or_figure_replaces_another(tmp_path):
+    with pytest.raises(ValueError, match="two tables or figures of paper are called 'curve'"):
+        write_page("paper", "A paper", "", [section(), section()], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_differences_of_all_papers_stand_in_the_order_of_their_numbers(tmp_path):
+    for name, tags in (("one", ("E10", "E2")), ("two", ("E3",))):
+        (tmp_path / name).mkdir()
+        write_page(name, name, "", [section(name=tag, tag=tag) for tag in tags], tmp_path / name)
+    write_differences(tmp_path, ("one", "two", "not reproduced yet"))
+    page = (tmp_path / "differences.md").read_text(encoding="utf-8")
+    assert page.index("## [one]") < page.index("| E2 |") < page.index("| E10 |") < page.index("## [two]")
+    assert page.index("## [two]") < page.index("| E3 |")
+    assert "it rained" in page
+
+
+def test_numbers_in_tables_have_four_digits():
+    assert markdown_table(("a",), [(12345.678,), (1e-9,), ("word",)]).endswith("| 1.235e+04 |\n| 1e-09 |\n| word |")
+
+
+@pytest.mark.parametrize("name", ["chung2008", "tidybot2"])
+def test_a_drawn_wheel_stands_behind_its_pivot(name):
+    """The link's line goes from the pivot by the trail against the rolling direction, here along −x."""
+    robot = load_robot(name)
+    axis = new_figure().axes[0]
+    draw_robot(axis, robot, [0.0] * robot.caster_count)
+    links = [line.get_xydata() for line in axis.lines if len(line.get_xydata()) == 2]
+    for caster, ((x, y), (wheel_x, wheel_y)) in zip(robot.casters, links, strict=True):
+        assert (x, y) == (caster.x, caster.y)
+        assert (wheel_x, wheel_y) == pytest.approx((caster.x - caster.trail, caster.y + caster.offset), abs=1e-15)
