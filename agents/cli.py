@@ -1,4 +1,4 @@
-"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, export."""
+"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, export."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -169,6 +169,36 @@ def reproduce(
         typer.echo(f"{share} printed numbers and statements agree; {out / paper}.md shows all.")
         if verdict.unexplained:
             raise ValueError(f"no reason is known why these differ: {'; '.join(verdict.unexplained)}")
+
+
+@app.command()
+def design(
+    robot: Annotated[
+        str | None, typer.Option(help="Name of a robot in configs/robots, or path of a YAML file; else the target's.")
+    ] = None,
+    target: Annotated[
+        str, typer.Option(help="Name of a target in configs/designs, or path of a YAML file.")
+    ] = "indoor",
+    out: Out = Path("runs/design"),
+    overwrite: Overwrite = False,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a setting of the target, e.g. --set speed=1.5. May be repeated."),
+    ] = None,
+) -> None:
+    """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
+    with _plain_errors():
+        from .design import design as run
+        from .design import read_design
+
+        settings = read_design(target, robot, _parsed(change))
+        with tqdm(total=100, desc=f"design of {settings.robot}", unit="%") as bar:
+
+            def report(share: float) -> None:
+                bar.update(round(100.0 * share) - bar.n)
+
+            words = run(settings, out, overwrite, report)
+        typer.echo(f"{words} The page, the picture, the table of motors and the robot file are in {out}.")
 
 
 @app.command()

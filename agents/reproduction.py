@@ -27,14 +27,15 @@ PAPERS = {
         "for an Omni-Directional Mobile Robot with Three Caster Wheels*, International Journal of Control, Automation, "
         "and Systems 6(1), 2008.",
         {
-            "kinematics": "caster_gym.papers.chung2008_kinematics:section",
-            "accelerations": "caster_gym.papers.chung2008_hessians:section",
-            "orthogonal complement": "caster_gym.papers.chung2008_complement:section",
-            "operational forces": "caster_gym.papers.chung2008_forces:section",
-            "wheel mass": "caster_gym.papers.chung2008_wheel_mass:section",
-            "missing term": "caster_gym.papers.chung2008_missing_term:section",
+            "kinematics": "caster_gym.papers.chung2008.kinematics:section",
+            "accelerations": "caster_gym.papers.chung2008.hessians:section",
+            "orthogonal complement": "caster_gym.papers.chung2008.complement:section",
+            "operational forces": "caster_gym.papers.chung2008.forces:section",
+            "wheel mass": "caster_gym.papers.chung2008.wheel_mass:section",
+            "missing term": "caster_gym.papers.chung2008.missing_term:section",
             "incomplete models": "caster_gym.agents.incomplete_models:section",
-            "impulse": "caster_gym.papers.chung2008_impulse:section",
+            "impulse": "caster_gym.papers.chung2008.impulse:section",
+            "uniform impulse": "caster_gym.papers.chung2008.circles:section",
         },
     ),
     "kim2001": Paper(
@@ -42,10 +43,12 @@ PAPERS = {
         "W. Kim, D. H. Kim, B.-J. Yi, B.-J. You and S.-I. Yang, *Design of an Omni-directional Mobile Robot with 3 "
         "Caster Wheels*, Transactions on Control, Automation and Systems Engineering 3, 2001.",
         {
-            "kinematics": "caster_gym.papers.kim2001_kinematics:section",
-            "singularities": "caster_gym.papers.kim2001_singularity:section",
-            "sets of joints": "caster_gym.papers.kim2001_joint_sets:section",
-            "isotropy": "caster_gym.papers.kim2001_isotropy:section",
+            "kinematics": "caster_gym.papers.kim2001.kinematics:section",
+            "singularities": "caster_gym.papers.kim2001.singularity:section",
+            "sets of joints": "caster_gym.papers.kim2001.joint_sets:section",
+            "isotropy of three joints": "caster_gym.papers.kim2001.isotropy:three_joints",
+            "isotropy of four joints": "caster_gym.papers.kim2001.redundancy:four_joints",
+            "isotropy of six joints": "caster_gym.papers.kim2001.redundancy:six_joints",
         },
     ),
 }

@@ -2,7 +2,7 @@
 
 import pytest
 
-from caster_gym.papers.chung2008_hessians import section
+from caster_gym.papers.chung2008.hessians import section
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from caster_gym.papers.chung2008_kinematics import section
+from caster_gym.papers.chung2008.kinematics import section
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from caster_gym.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
-from caster_gym.papers.chung2008_kinematics import Sample
+from caster_gym.papers.chung2008.kinematics import Sample
 from caster_gym.papers.drawing import COLOURS, new_figure
 from caster_gym.papers.notation import CHUNG2008, Array
 from caster_gym.papers.page import Check, Difference, Picture, Section, Table
@@ -65,7 +65,7 @@ def _checks(sample: Sample) -> tuple[Check, ...]:
             "φ̇ in the first term",
             f"off by up to {as_printed:.2g}; with φ̈ by {mended:.0e}",
             as_printed < ROUNDING,
-            "E?: the first term needs φ̈; the text at hand may have lost a dot",
+            "E11: the first term needs φ̈; the text at hand may have lost a dot",
         ),
         Check(
             "(19): φ̈ = G ü + u̇ᵀ H u̇, with (A2)",
@@ -85,7 +85,7 @@ def _checks(sample: Sample) -> tuple[Check, ...]:
             "symmetric",
             f"skew up to {skew.max():.3g} m; over ground {pair:.3g} m (r/2) of θ and η, else {over_ground.max():.0e} m",
             bool(skew.max() < ROUNDING),
-            f"E?: its symmetric part would do as well in (18), within {form_off:.0e} m/s²; the "
+            f"E12: its symmetric part would do as well in (18), within {form_off:.0e} m/s²; the "
             f"symmetric array of a linkage with a slider for θ would be wrong by up to {linkage:.2g} m/s², "
             f"{100 * share:.0f} % (rms) of the acceleration at constant joint rates",
         ),
@@ -121,7 +121,7 @@ def _differences(sample: Sample) -> tuple[Difference, ...]:
     linkage, share = _linkage_error(sample)
     return (
         Difference(
-            "E?",
+            "E11",
             "(18), first term",
             "[G] φ̇",
             "[G] φ̈",
@@ -129,7 +129,7 @@ def _differences(sample: Sample) -> tuple[Difference, ...]:
             f"equation holds for the joint accelerations of the mechanics within {mended:.0e}",
         ),
         Difference(
-            "E?",
+            "E12",
             "appendix A.1",
             "position Hessian matrix is symmetric",
             "not that of a rolling wheel: over ground the pair (θ, η) has r f⊥ and 0, all other pairs are symmetric",

@@ -1,0 +1,77 @@
+"""What a robot is to be able to do, from which the size of its wheels and motors follows."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from caster_gym.analysis.actuation import DEGREES_OF_FREEDOM, SINGULAR, worst_conditioning
+from caster_gym.configuration import Frozen
+from caster_gym.paths.specification import PathSpecification
+from caster_gym.robot import Robot
+
+
+class Payload(Frozen):
+    """A load that is fixed to the platform."""
+
+    mass: NonNegativeFloat  # [kg]
+    inertia: NonNegativeFloat = 0.0  # [kg m²] about a vertical axis through its mass centre
+    com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
+
+
+class Target(Frozen):
+    """Motions that the motors must give: every one within these limits, and those of the paths.
+
+    Speed and yaw rate may be at their greatest together, accelerations too, each in whatever direction.
+    """
+
+    speed: PositiveFloat  # [m/s] of C, in every direction
+    yaw_rate: PositiveFloat  # [rad/s]
+    acceleration: PositiveFloat  # [m/s²] of C over ground, in every direction
+    yaw_acceleration: PositiveFloat  # [rad/s²]
+    accelerating_up_to: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0  # [-] of speed and yaw rate; beyond, cruising
+    flip_speed: NonNegativeFloat | None = None  # [m/s] up to which casters may stand at any angle; None: by (S2)
+    payload: Payload | None = None
+    paths: tuple[PathSpecification, ...] = ()
+    time_step: PositiveFloat = 0.02  # [s] at which paths are looked at
+    actuation: Literal["all"] | tuple[str, ...] | None = None  # driven joints; None: as the robot file says
+    margin: Annotated[float, Field(ge=1.0)] = 1.3  # [-] as if every torque and speed were that many times as great
+
+    @model_validator(mode="after")
+    def _flips_within_the_speed(self) -> Self:
+        if self.flip_speed is not None and self.flip_speed > self.speed:
+            raise ValueError(f"flip_speed must be at most the speed of {self.speed:g} m/s, got {self.flip_speed:g} m/s")
+        return self
+
+
+def driven_as(robot: Robot, target: Target) -> Robot:
+    """The robot with the joints driven that the target names."""
+    return robot if target.actuation is None else robot.with_actuation(target.actuation)
+
+
+def loaded(robot: Robot, target: Target) -> Robot:
+    """The robot with the target's payload on its platform."""
+    load, bare = target.payload, robot.platform
+    if load is None or load.mass + load.inertia == 0.0:
+        return robot
+    mass = bare.mass + load.mass
+    x, y = ((bare.mass * p + load.mass * q) / mass for p, q in zip(bare.com, load.com, strict=True))
+    inertia = bare.inertia + load.inertia
+    for part in (bare, load):
+        inertia += part.mass * ((part.com[0] - x) ** 2 + (part.com[1] - y) ** 2)
+    platform = bare.model_copy(update={"mass": mass, "inertia": inertia, "com": (x, y)})
+    return robot.model_copy(update={"platform": platform})
+
+
+def check_actuation(robot: Robot) -> None:
+    """Refuse driven joints that cannot push the robot in every direction at all steering angles: no motor would do."""
+    names = ", ".join(robot.driven)
+    if len(robot.driven) < DEGREES_OF_FREEDOM:
+        raise ValueError(
+            f"a platform has three degrees of freedom: drive three joints or more of robot {robot.name!r}, got {names}"
+        )
+    value, _ = worst_conditioning(robot)
+    if value < SINGULAR:
+        raise ValueError(
+            f"robot {robot.name!r} driven by {names} cannot push itself in every direction at all steering angles "
+            f"(its conditioning falls to {value:.2g}), so no motors are strong enough; drive both joints of two casters"
+        )

@@ -1,0 +1,74 @@
+"""Reproductions end whole or not at all, and say what they cannot explain."""
+
+from importlib import import_module
+
+import pytest
+from typer.testing import CliRunner
+
+from caster_gym.agents import reproduction
+from caster_gym.agents.cli import app
+from caster_gym.agents.reproduction import PAPERS, Paper, find_paper, reproduce
+from caster_gym.papers.page import Check, Difference, Section
+
+
+def explained():
+    checks = (Check("(1)", "2", "2", True), Check("(2)", "3", "4", False, "E1: a sign"))
+    return Section("One", "Text.", checks, differences=(Difference("E1", "(2)", "3", "4", "measured"),))
+
+
+def unexplained():
+    return Section("Two", "Text.", (Check("(3)", "5", "6", False),))
+
+
+def broken():
+    raise ValueError("no such robot")
+
+
+@pytest.fixture
+def papers(monkeypatch):
+    """Papers with one section each, called after them."""
+    made = {f.__name__: Paper("A title", "Somebody.", {"work": f"{__name__}:{f.__name__}"}) for f in SECTIONS}
+    monkeypatch.setattr(reproduction, "PAPERS", made)
+    monkeypatch.setattr(reproduction, "_build", lambda place: globals()[place.split(":")[1]]())
+
+
+SECTIONS = (explained, unexplained, broken)
+
+
+def test_a_reproduction_leaves_a_page_and_its_folder(papers, tmp_path):
+    told = []
+    verdict = reproduce("explained", tmp_path, False, lambda *what: told.append(what))
+    assert verdict == (1, 2, ())
+    assert told == [("work", 0), ("done", 1)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["differences.md", "explained", "explained.md"]
+    assert "E1: a sign" in (tmp_path / "explained.md").read_text(encoding="utf-8")
+    assert "| E1 | (2) | 3 | 4 | measured |" in (tmp_path / "differences.md").read_text(encoding="utf-8")
+    assert (tmp_path / "explained" / "run.yaml").is_file()
+
+
+def test_what_fails_leaves_the_results_of_before(papers, tmp_path):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / ".caster-gym").touch()
+    with pytest.raises(ValueError, match="no such robot"):
+        reproduce("broken", tmp_path, True, lambda *_: None)
+    assert [path.name for path in tmp_path.iterdir()] == ["broken"]
+
+
+def test_a_difference_without_a_reason_is_an_error_of_the_command(papers, tmp_path):
+    result = CliRunner().invoke(app, ["reproduce", "unexplained", "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "no reason is known why these differ: (3)" in result.output
+    assert (tmp_path / "unexplained.md").is_file()
+
+
+def test_an_unknown_paper_is_named(tmp_path):
+    result = CliRunner().invoke(app, ["reproduce", "chung2009", "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "unknown paper 'chung2009'; did you mean 'chung2008'?" in result.output
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_every_section_of_a_paper_is_there(name):
+    for place in find_paper(name).parts.values():
+        module, function = place.split(":")
+        assert callable(getattr(import_module(module), function))
