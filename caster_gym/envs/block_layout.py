@@ -1,8 +1,11 @@
-"""How the quantities of a task lie in a block of robots, and what else a batch keeps.
+"""How the quantities of a task lie in memory, and what else a batch keeps.
 
-Rows of a block: state, room, wrench, motor commands, mean motor torques, record, reference, preview, situation, nearest
-obstacles, observation, report, robot parameters. The tuples in `Sizes` have an item per caster, per previewed point and
-per observed obstacle: their lengths are part of their types, so that all rows are constants of the compiled code.
+Rows of a block, which is kept from step to step: state, room, wrench, progress, robot parameters. On a desk, which stays
+in the processor's cache, one block after the other is worked out; behind the rows of the block it has motor commands,
+mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two arrays instead
+of one desk would stop the compiler from making SIMD loops.) The tuples in `Sizes` have an item per caster, per
+previewed point and per observed obstacle: their lengths are part of their types, so that all rows are constants of the
+compiled code.
 """
 
 from typing import Any, NamedTuple
@@ -13,6 +16,7 @@ from caster_gym.engines.lanes import BODY_ROWS
 from caster_gym.engines.numba_compiler import INLINE
 from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS
 from caster_gym.envs.tracking import Record, Situation
+from caster_gym.mechanics.parameters import CASTER_FIELDS, PLATFORM_FIELDS
 
 RECORD_ROWS = len(Record._fields)
 SITUATION_ROWS = len(Situation._fields)
@@ -66,9 +70,27 @@ def wrench_row(sizes: Sizes) -> int:
 
 
 @register_jitable(**INLINE)
+def progress_row(sizes: Sizes) -> int:
+    """Row of the progress [m], negative at the start of an episode."""
+    return wrench_row(sizes) + 3
+
+
+@register_jitable(**INLINE)
+def parameter_row(sizes: Sizes) -> int:
+    """First row of the robot's parameters, the last ones of a block."""
+    return progress_row(sizes) + 1
+
+
+@register_jitable(**INLINE)
+def block_rows(sizes: Sizes) -> int:
+    """Rows of a block."""
+    return parameter_row(sizes) + PLATFORM_FIELDS + CASTER_FIELDS * len(sizes.casters)
+
+
+@register_jitable(**INLINE)
 def command_row(sizes: Sizes) -> int:
     """First row of the motor commands."""
-    return wrench_row(sizes) + 3
+    return block_rows(sizes)
 
 
 @register_jitable(**INLINE)
@@ -115,6 +137,6 @@ def report_row(sizes: Sizes) -> int:
 
 
 @register_jitable(**INLINE)
-def parameter_row(sizes: Sizes) -> int:
-    """First row of the robot's parameters, the last ones."""
+def desk_rows(sizes: Sizes) -> int:
+    """Rows of a desk."""
     return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters)

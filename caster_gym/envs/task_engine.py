@@ -78,6 +78,8 @@ class TaskEngine:
         self._parameter_row = layout.parameter_row(self._sizes)
         blocks = np.zeros((block_count(count), (self._parameter_row + nominal.shape[1]) * LANES))
         to_lanes(np.repeat(nominal, count, axis=0), blocks, self._parameter_row)
+        self._desk = np.zeros(layout.desk_rows(self._sizes) * LANES)
+        self._reports = np.zeros((self._report_rows, count))  # the latest, for pictures
         among = len(plan.around.obstacles.radii) > 0
         self._world = layout.World(
             blocks=blocks,
@@ -112,7 +114,10 @@ class TaskEngine:
         outcome = self._empty() if into is None else into
         views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
-        kernel.restart(selected, paths, self._world, self._spread, views, self._sizes)
+        kernel.restart(selected, paths, self._world, self._spread, views, self._desk, self._sizes)
+        if into is None:
+            self._reports = self._reports.copy()
+            self._reports[:, selected] = outcome.reports[:, selected]
         return outcome
 
     def checked_path(self, path: Any) -> NDArray[np.int64]:
@@ -134,11 +139,12 @@ class TaskEngine:
         observations = np.empty((self.count, self.layout.size), dtype=np.float32)
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
-        arguments = (self._world, actions, layout.Views(observations, reports, results), self._sizes)
+        views = layout.Views(observations, reports, results)
         if self.count == 1:
-            kernel.step_single(*arguments)
+            kernel.step_single(self._world, actions, views, self._desk, self._sizes)
         else:
-            over_blocks(kernel.step_blocks, len(self._world.blocks), *arguments)
+            over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
+        self._reports = reports
         return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
 
     def _empty(self) -> Outcome:
@@ -231,8 +237,7 @@ class TaskEngine:
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
         state = self.states[robot]
-        row = self._world.blocks[robot // LANES].reshape(-1, LANES)[:, robot % LANES]
-        report = row[layout.report_row(self._sizes) : self._parameter_row]
+        report = self._reports[:, robot]
         path = int(self._world.clocks[1, robot])
         near, end = self.plan.arenas[path]
         record = report[layout.FIRST_RECORD :]

@@ -1,4 +1,7 @@
-"""The compiled step of every task: the loops over the robots of a block, see `caster_gym.envs.block_layout`."""
+"""The compiled step of every task: the loops over the robots of a block, see `caster_gym.envs.block_layout`.
+
+Blocks are what is kept of the robots; a desk is where one after the other is worked out.
+"""
 
 import math
 from typing import Any
@@ -22,10 +25,13 @@ from caster_gym.envs.block_layout import (
     Sizes,
     Views,
     World,
+    block_rows,
     command_row,
+    desk_rows,
     nearest_row,
     observation_row,
     parameter_row,
+    progress_row,
     record_row,
     reference_row,
     report_row,
@@ -39,7 +45,7 @@ from caster_gym.envs.randomness import uniform
 from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import driven_step, guarded_driven_step
-from caster_gym.mechanics.scalars import add, each, flatten, where
+from caster_gym.mechanics.scalars import add, clip, each, flatten, where
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
 
 _REFERENCE = (0.0,) * REFERENCE_ROWS
@@ -92,32 +98,32 @@ def _neighbourhood(robot: Any, world: World) -> Any:
 
 
 @register_jitable(**INLINE)
-def _measure(block: Any, first: Any, here: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
+def _measure(desk: Any, first: Any, here: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
     """Measure the room of robots that may soon need to know it."""
     if obstacles is None:
         return
     row = room_row(sizes)
     for lane in range(here):
-        state = read_state(block, lane, 0, sizes.casters)
-        if worth_measuring(block[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
+        state = read_state(desk, lane, 0, sizes.casters)
+        if worth_measuring(desk[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
             near, end = _neighbourhood(first + lane, world)
             gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
-            block[row * LANES + lane] = gap
+            desk[row * LANES + lane] = gap
 
 
 @register_jitable(**INLINE)
-def _take_care(block: Any, first: Any, here: Any, share: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
+def _take_care(desk: Any, first: Any, here: Any, share: Any, obstacles: Any, world: World, sizes: Sizes) -> None:
     """Step the robots that may touch something."""
     if obstacles is None:
         return
     for lane in range(here):
-        if block[room_row(sizes) * LANES + lane] < 0.0:
+        if desk[room_row(sizes) * LANES + lane] < 0.0:
             near, end = _neighbourhood(first + lane, world)
-            careful_step(block, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
+            careful_step(desk, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: World, sizes: Sizes) -> Any:
+def _look_around(desk: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: World, sizes: Sizes) -> Any:
     """Write the nearest obstacles; returns the gap to the nearest one. [m]"""
     gap = math.inf
     if obstacles is None:
@@ -126,37 +132,37 @@ def _look_around(block: Any, lane: Any, robot: Any, state: Any, obstacles: Any, 
     for k in range(near, end):
         apart = separation(state.position, state.heading, world.hull, obstacles, k)
         gap = min(apart.gap, gap)
-        _insert(block, lane, nearest_row(sizes), apart.gap, apart.nx, apart.ny, sizes)
+        _insert(desk, lane, nearest_row(sizes), apart.gap, apart.nx, apart.ny, sizes)
     return gap
 
 
 @register_jitable(**INLINE)
-def _drive(block: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
+def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
     """Let robots, the first of the batch's in this block being `first`, move for a control period."""
     rows, room_at, h, reach = torque_row(sizes), room_row(sizes), world.time_step, reach_of(world.hull)
     share = 1.0 / world.substeps
     for row in range(rows, reference_row(sizes)):
         for lane in range(lanes):
-            block[row * LANES + lane] = 0.0
+            desk[row * LANES + lane] = 0.0
     for _ in range(world.substeps):
-        _measure(block, first, here, world.obstacles, world, sizes)
+        _measure(desk, first, here, world.obstacles, world, sizes)
         for lane in range(lanes):
-            state = read_state(block, lane, 0, sizes.casters)
-            commands = read_pairs(block, lane, command_row(sizes), sizes.casters)
-            wrench = read(block, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
-            robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+            state = read_state(desk, lane, 0, sizes.casters)
+            commands = read_pairs(desk, lane, command_row(sizes), sizes.casters)
+            wrench = read(desk, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
+            robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
             target, drive = driven_step(state, commands, wrench, h, robot)
-            room = block[room_at * LANES + lane]
+            room = desk[room_at * LANES + lane]
             end, room, went = settled(world.obstacles, room, state, target, h, reach)
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
-            write(block, lane, 0, end)
-            write(block, lane, rows, add(read(block, lane, rows, mean), mean))
-            block[room_at * LANES + lane] = room
-        _take_care(block, first, here, share, world.obstacles, world, sizes)
+            write(desk, lane, 0, end)
+            write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
+            desk[room_at * LANES + lane] = room
+        _take_care(desk, first, here, share, world.obstacles, world, sizes)
 
 
 def _careful_step(
-    block: Any,
+    desk: Any,
     lane: Any,
     share: Any,
     near: Any,
@@ -168,19 +174,19 @@ def _careful_step(
 ) -> None:
     """One substep of a robot that may touch something."""
     hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
-    state = read_state(block, lane, 0, sizes.casters)
-    commands = read_pairs(block, lane, command_row(sizes), sizes.casters)
-    wrench = read(block, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
-    robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+    state = read_state(desk, lane, 0, sizes.casters)
+    commands = read_pairs(desk, lane, command_row(sizes), sizes.casters)
+    wrench = read(desk, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
+    robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
     state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end)
     mean = each(_scaled, (share,), (*flatten(drive.torques), drive.power))
-    write(block, lane, 0, pack_state(state))
+    write(desk, lane, 0, pack_state(state))
     rows = torque_row(sizes)
-    write(block, lane, rows, add(read(block, lane, rows, mean), mean))
-    done = Record(*read(block, lane, record_row(sizes), _RECORD))
+    write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
+    done = Record(*read(desk, lane, record_row(sizes), _RECORD))
     hit = touch.impacts > 0.0
     write(
-        block,
+        desk,
         lane,
         record_row(sizes) + 1,
         (
@@ -192,138 +198,160 @@ def _careful_step(
             done.impacts + touch.impacts,
         ),
     )
-    block[room_row(sizes) * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
+    desk[room_row(sizes) * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
 
 
 @register_jitable(**INLINE)
-def _read_point(block: Any, lane: Any, row: Any, index: Any) -> Any:
-    return read(block, lane, row + POINT_ROWS * index, _POINT)
+def _read_point(desk: Any, lane: Any, row: Any, index: Any) -> Any:
+    return read(desk, lane, row + POINT_ROWS * index, _POINT)
 
 
 @register_jitable(**INLINE)
-def _read_neighbour(block: Any, lane: Any, row: Any, index: Any) -> Any:
-    return read(block, lane, row + NEIGHBOUR_ROWS * index, _NEIGHBOUR)
+def _read_neighbour(desk: Any, lane: Any, row: Any, index: Any) -> Any:
+    return read(desk, lane, row + NEIGHBOUR_ROWS * index, _NEIGHBOUR)
 
 
 @register_jitable(**INLINE)
-def _look(block: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
+def _look(desk: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
     """Observe and score robots whose reference has been fetched."""
     weights = weights_of(guide)
     for i in range(lanes):
         lane = first + i
-        state = read_state(block, lane, 0, sizes.casters)
-        torques = read_pairs(block, lane, torque_row(sizes), sizes.casters)
-        record = Record(*read(block, lane, record_row(sizes), _RECORD))
-        reference = Reference(*read(block, lane, reference_row(sizes), _REFERENCE))
-        points = each(_read_point, (block, lane, reference_row(sizes) + REFERENCE_ROWS), counting(sizes.preview))
-        situation = Situation(*read(block, lane, situation_row(sizes), _SITUATION))
-        nearest = each(_read_neighbour, (block, lane, nearest_row(sizes)), counting(sizes.nearest))
-        robot = read_robot(block, lane, parameter_row(sizes), sizes.casters)
+        state = read_state(desk, lane, 0, sizes.casters)
+        torques = read_pairs(desk, lane, torque_row(sizes), sizes.casters)
+        record = Record(*read(desk, lane, record_row(sizes), _RECORD))
+        reference = Reference(*read(desk, lane, reference_row(sizes), _REFERENCE))
+        points = each(_read_point, (desk, lane, reference_row(sizes) + REFERENCE_ROWS), counting(sizes.preview))
+        situation = Situation(*read(desk, lane, situation_row(sizes), _SITUATION))
+        nearest = each(_read_neighbour, (desk, lane, nearest_row(sizes)), counting(sizes.nearest))
+        robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
         errors, ended, terms = judge(state, reference, torques, record, situation, robot, weights)
         told = report(state, reference, errors, torques, record, situation, ended, terms, robot)
-        write(block, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, robot))
-        write(block, lane, report_row(sizes), flat_report(told, torques))
+        write(desk, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, robot))
+        write(desk, lane, report_row(sizes), flat_report(told, torques))
 
 
 @register_jitable(**INLINE)
-def _fetch(block: Any, lane: Any, robot: Any, before: Any, world: World, sizes: Sizes) -> None:
-    """Fetch what the robot is to do, and what is near it; before: its progress so far, negative at a start."""
-    state = read_state(block, lane, 0, sizes.casters)
+def _fetch(desk: Any, lane: Any, robot: Any, world: World, sizes: Sizes) -> None:
+    """Fetch what the robot is to do, and what is near it."""
+    state = read_state(desk, lane, 0, sizes.casters)
     clock, path = world.clocks[0, robot], world.clocks[1, robot]
-    progress, share = guide_robot(block, lane, reference_row(sizes), state, clock, path, before, world.guide)
+    before = desk[progress_row(sizes) * LANES + lane]
+    progress, share = guide_robot(desk, lane, reference_row(sizes), state, clock, path, before, world.guide)
+    desk[progress_row(sizes) * LANES + lane] = progress
     row = nearest_row(sizes)
     for k in range(len(sizes.nearest)):
-        block[(row + NEIGHBOUR_ROWS * k) * LANES + lane] = GAP_LIMIT
-        block[(row + NEIGHBOUR_ROWS * k + 1) * LANES + lane] = 0.0
-        block[(row + NEIGHBOUR_ROWS * k + 2) * LANES + lane] = 0.0
-    gap = _look_around(block, lane, robot, state, world.obstacles, world, sizes)
-    write(block, lane, situation_row(sizes), (progress, share, gap))
+        desk[(row + NEIGHBOUR_ROWS * k) * LANES + lane] = GAP_LIMIT
+        desk[(row + NEIGHBOUR_ROWS * k + 1) * LANES + lane] = 0.0
+        desk[(row + NEIGHBOUR_ROWS * k + 2) * LANES + lane] = 0.0
+    gap = _look_around(desk, lane, robot, state, world.obstacles, world, sizes)
+    write(desk, lane, situation_row(sizes), (progress, share, gap))
 
 
 @register_jitable(**INLINE)
-def _insert(block: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: Sizes) -> None:
+def _insert(desk: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: Sizes) -> None:
     """Put an obstacle among the nearest ones, which stay in order."""
     for k in range(len(sizes.nearest)):
         at = (row + NEIGHBOUR_ROWS * k) * LANES + lane
-        if gap < block[at]:
-            gap, block[at] = block[at], gap
-            nx, block[at + LANES] = block[at + LANES], nx
-            ny, block[at + 2 * LANES] = block[at + 2 * LANES], ny
+        if gap < desk[at]:
+            gap, desk[at] = desk[at], gap
+            nx, desk[at + LANES] = desk[at + LANES], nx
+            ny, desk[at + 2 * LANES] = desk[at + 2 * LANES], ny
 
 
 @register_jitable(**INLINE)
-def _deliver(block: Any, lane: Any, count: Any, robot: Any, views: Views, sizes: Sizes) -> None:
+def _deliver(desk: Any, lane: Any, count: Any, robot: Any, views: Views, sizes: Sizes) -> None:
     """Copy observations and reports of so many robots, from a lane and a robot on, to where Python reads them."""
     row = observation_row(sizes)
     for i in range(count):
         for j in range(views.observations.shape[1]):
-            views.observations[robot + i, j] = block[(row + j) * LANES + lane + i]
+            views.observations[robot + i, j] = desk[(row + j) * LANES + lane + i]
     row = report_row(sizes)
     for j in range(views.reports.shape[0]):
         for i in range(count):
-            views.reports[j, robot + i] = block[(row + j) * LANES + lane + i]
+            views.reports[j, robot + i] = desk[(row + j) * LANES + lane + i]
     for i in range(robot, robot + count):
         views.reports[HEADING_SIN, i] = math.atan2(views.reports[HEADING_SIN, i], views.reports[HEADING_COS, i])
 
 
 @register_jitable(**INLINE)
-def _step_lanes(i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
+def _give_results(desk: Any, here: Any, robot: Any, world: World, views: Views, sizes: Sizes) -> None:
+    """Rewards, and which episodes have ended, of so many robots, from a robot on."""
+    row = report_row(sizes)
+    for i in range(here):
+        reward, failed = 0.0, 0.0
+        for j in range(TERMS):
+            reward += desk[(row + FIRST_TERM + j) * LANES + i]
+        for j in range(ENDINGS):
+            failed += desk[(row + j) * LANES + i]
+        views.results[0, robot + i] = reward
+        views.results[1, robot + i] = failed
+    for i in range(robot, robot + here):
+        periods = world.guide.spans[world.clocks[1, i], 2]
+        views.results[2, i] = 1.0 if world.clocks[0, i] >= periods else 0.0
+
+
+@register_jitable(**INLINE)
+def _copy(source: Any, target: Any, lane: Any, lanes: Any, rows: Any) -> None:
+    """Copy the first rows of all lanes, or of one."""
+    if lanes == LANES:
+        target[: rows * LANES] = source[: rows * LANES]
+    else:
+        for row in range(rows):
+            target[row * LANES + lane] = source[row * LANES + lane]
+
+
+@register_jitable(**INLINE)
+def _step_lanes(
+    i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes
+) -> None:
     """One control period of the robots of block i, of which `look` observes as many as there are lanes."""
-    block = world.blocks[i]
     first = i * LANES
     here = min(lanes, len(actions) - first)
+    _copy(world.blocks[i], desk, 0, lanes, block_rows(sizes))
     row = command_row(sizes)
-    for lane in range(here):
-        for j in range(len(world.slots)):
-            slot = world.slots[j]
-            command = 0.0 if slot < 0 else float(actions[first + lane, slot])
-            block[(row + j) * LANES + lane] = min(max(command, -1.0), 1.0)
-    _drive(block, first, lanes, here, world, sizes)
+    for j in range(2 * len(sizes.casters)):
+        slot = world.slots[j]
+        for lane in range(here if slot >= 0 else 0):
+            desk[(row + j) * LANES + lane] = clip(float(actions[first + lane, slot]), -1.0, 1.0)
+    _drive(desk, first, lanes, here, world, sizes)
     for lane in range(here):
         world.clocks[0, first + lane] += 1
-        _fetch(block, lane, first + lane, block[situation_row(sizes) * LANES + lane], world, sizes)
-    look(block, world.guide, sizes)
-    _deliver(block, 0, here, first, views, sizes)
-    for robot in range(first, first + here):
-        reward = 0.0
-        for j in range(TERMS):
-            reward += views.reports[FIRST_TERM + j, robot]
-        failed = 0.0
-        for j in range(ENDINGS):
-            failed += views.reports[j, robot]
-        views.results[0, robot] = reward
-        views.results[1, robot] = failed
-        periods = world.guide.spans[world.clocks[1, robot], 2]
-        views.results[2, robot] = 1.0 if world.clocks[0, robot] >= periods else 0.0
+        _fetch(desk, lane, first + lane, world, sizes)
+    _copy(desk, world.blocks[i], 0, lanes, parameter_row(sizes))
+    look(desk, world.guide, sizes)
+    _deliver(desk, 0, here, first, views, sizes)
+    _give_results(desk, here, first, world, views, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_all(block: Any, guide: Any, sizes: Sizes) -> None:
-    _look(block, 0, LANES, guide, sizes)
+def _look_at_all(desk: Any, guide: Any, sizes: Sizes) -> None:
+    _look(desk, 0, LANES, guide, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_first(block: Any, guide: Any, sizes: Sizes) -> None:
-    look_at_one(block, 0, guide, sizes)
+def _look_at_first(desk: Any, guide: Any, sizes: Sizes) -> None:
+    look_at_one(desk, 0, guide, sizes)
 
 
-def _look_at_one(block: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
-    _look(block, lane, 1, guide, sizes)
+def _look_at_one(desk: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
+    _look(desk, lane, 1, guide, sizes)
 
 
-def _step_block(i: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
-    world, views = _borrowed_world(world), _borrowed_views(views)
-    _step_lanes(i, LANES, _look_at_all, world, actions, views, sizes)
+def _step_block(i: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes) -> None:
+    world, views, desk = _borrowed_world(world), _borrowed_views(views), borrowed(desk)
+    _step_lanes(i, LANES, _look_at_all, world, actions, views, desk, sizes)
 
 
-def _step_single(world: World, actions: Any, views: Views, sizes: Sizes) -> None:
-    world, views = _borrowed_world(world), _borrowed_views(views)
-    _step_lanes(0, 1, _look_at_first, world, actions, views, sizes)
+def _step_single(world: World, actions: Any, views: Views, desk: Any, sizes: Sizes) -> None:
+    world, views, desk = _borrowed_world(world), _borrowed_views(views), borrowed(desk)
+    _step_lanes(0, 1, _look_at_first, world, actions, views, desk, sizes)
 
 
 def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
+    desk = np.zeros(desk_rows(sizes) * LANES)  # of this thread; lanes without a robot hold numbers too
     for i in range(first, end):
-        step_block(i, world, actions, views, sizes)
+        step_block(i, world, actions, views, desk, sizes)
 
 
 @register_jitable(**INLINE)
@@ -332,12 +360,13 @@ def _random_direction(key: Any, episode: Any, index: Any) -> Any:
     return math.cos(angle), math.sin(angle)
 
 
-def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views, sizes: Sizes) -> None:
+def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views, desk: Any, sizes: Sizes) -> None:
     """Start new episodes of the selected robots; wanted: path of each, −1 draws one; spread: greatest offset, turn."""
-    world, views = _borrowed_world(world), _borrowed_views(views)
+    world, views, desk = _borrowed_world(world), _borrowed_views(views), borrowed(desk)
     for i in range(len(selected)):
         robot = selected[i]
         block, lane = world.blocks[robot // LANES], robot % LANES
+        _copy(block, desk, lane, 1, block_rows(sizes))
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
@@ -349,15 +378,19 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         directions = each(_random_direction, (key, episode), counting(sizes.casters))
         nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions)
         path = world.clocks[1, robot]
-        guide_robot(block, lane, reference_row(sizes), nowhere, 0, path, -1.0, world.guide)
-        reference = Reference(*read(block, lane, reference_row(sizes), _REFERENCE))
+        guide_robot(desk, lane, reference_row(sizes), nowhere, 0, path, -1.0, world.guide)
+        reference = Reference(*read(desk, lane, reference_row(sizes), _REFERENCE))
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
-        write(block, lane, 0, pack_state(state))
-        for row in range(room_row(sizes), reference_row(sizes)):
-            block[row * LANES + lane] = 0.0
-        _fetch(block, lane, robot, -1.0, world, sizes)
-        look_at_one(block, lane, world.guide, sizes)
-        _deliver(block, lane, 1, robot, views, sizes)
+        write(desk, lane, 0, pack_state(state))
+        for row in range(room_row(sizes), progress_row(sizes)):
+            desk[row * LANES + lane] = 0.0
+        desk[progress_row(sizes) * LANES + lane] = -1.0
+        for row in range(command_row(sizes), reference_row(sizes)):
+            desk[row * LANES + lane] = 0.0
+        _fetch(desk, lane, robot, world, sizes)
+        _copy(desk, block, lane, 1, parameter_row(sizes))
+        look_at_one(desk, lane, world.guide, sizes)
+        _deliver(desk, lane, 1, robot, views, sizes)
 
 
 careful_step = compiled(_careful_step)
