@@ -1,9 +1,9 @@
 """How the quantities of a task lie in memory, and what else a batch keeps.
 
-Rows of a block, which is kept from step to step: state, room, wrench, progress, robot parameters. On a desk, which stays
-in the processor's cache, one block after the other is worked out; behind the rows of the block it has motor commands,
-mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two arrays instead
-of one desk would stop the compiler from making SIMD loops.) The tuples in `Sizes` have an item per caster, per
+Rows of a block, which is kept from step to step: state, room, wrench, progress, robot parameters. On a desk, which
+stays in the processor's cache, one block after the other is worked out; behind the rows of the block it has motor
+commands, mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two arrays
+instead of one desk would stop the compiler from making SIMD loops.) The tuples in `Sizes` have an item per caster, per
 previewed point and per observed obstacle: their lengths are part of their types, so that all rows are constants of the
 compiled code.
 """
