@@ -4,7 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help install benchmark pictures test lint format clean
+.PHONY: help install benchmark pictures papers test lint format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
@@ -24,6 +24,10 @@ benchmark: $(INSTALLED) ## Learned and model-based control compared; results in 
 
 pictures: $(INSTALLED) ## The README's pictures, in docs/pictures
 	$(BIN)/python -m scripts.draw_pictures --out docs/pictures
+
+papers: $(INSTALLED) ## Both papers reproduced: pages, figures and tables in docs/papers
+	$(BIN)/caster-gym reproduce chung2008 --out docs/papers --overwrite
+	$(BIN)/caster-gym reproduce kim2001 --out docs/papers --overwrite
 
 test: lint ## Lint, then all tests
 	$(BIN)/python -m pytest

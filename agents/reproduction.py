@@ -45,7 +45,9 @@ PAPERS = {
         {
             "kinematics": "caster_gym.papers.kim2001.kinematics:section",
             "singularities": "caster_gym.papers.kim2001.singularity:section",
+            "lines of joints": "caster_gym.papers.kim2001.lines:section",
             "sets of joints": "caster_gym.papers.kim2001.joint_sets:section",
+            "trails": "caster_gym.papers.kim2001.trails:section",
             "isotropy of three joints": "caster_gym.papers.kim2001.isotropy:three_joints",
             "isotropy of four joints": "caster_gym.papers.kim2001.redundancy:four_joints",
             "isotropy of six joints": "caster_gym.papers.kim2001.redundancy:six_joints",

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 SECTIONS = "JLQNFUS"
 TAG = re.compile(rf"\(([{SECTIONS}]\d+)\)")
 DERIVED = re.compile(rf"\*\*\(([{SECTIONS}]\d+)\)\*\*")
-LAWS = {"J7", "U7"}  # that nobody needs to compute
+LAWS = {"J7", "Q7", "Q9", "U7"}  # that nobody needs to compute
 
 
 def tags(*paths):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from caster_gym.papers.kim2001_kinematics import CELLS, global_index, section
+from caster_gym.papers.kim2001.kinematics import CELLS, global_index, section
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +37,8 @@ def test_table_2_was_computed_with_the_joints_of_the_text(cell):
 
 def test_differences_are_measured(page):
     """E4: 2 b / d = 4 / 0.7 at cos φ₃ = ±1, which random angles nearly reach."""
-    sign, rows = page.differences
-    assert sign.tag == "E4"
+    sign, entry, rows = page.differences
+    assert (sign.tag, entry.tag, rows.tag) == ("E4", "E5", "E18")
     assert "off by up to 5.71" in sign.evidence
     assert "0.453 printed, 0.4525 by φ, 0.1581 by η" in rows.evidence
 

@@ -283,4 +283,4 @@ KIM2001_GENERAL = (
     *(Printed(f"(13), pivot {i}", KIM2001, _chain(i), False, _kim_13(i)) for i in (1, 2, 3)),
 )
 KIM2001_THREE = Printed("(24)", KIM2001, ("θ_1", "θ_2", "φ_3"), False, _kim_24, _kim_24_corrected, "E5")
-KIM2001_FOUR = Printed("(37)", KIM2001, ("θ_1", "φ_1", "θ_2", "φ_2"), False, _kim_37, _kim_37_corrected, "E?")
+KIM2001_FOUR = Printed("(37)", KIM2001, ("θ_1", "φ_1", "θ_2", "φ_2"), False, _kim_37, _kim_37_corrected, "E18")

@@ -149,7 +149,7 @@ def agreement(complements: tuple[OrthogonalComplement, ...]) -> tuple[tuple[Chec
     )
     return checks, Difference(
         "E3",
-        "chung2008, (27) and after (43)",
+        "(27) and after (43)",
         "P*_φφφ becomes a zero array",
         "off-axis term (D1)",
         f"the paper's own complement (27), with true twists, agrees with (D1) to {exact:.0e} and differs from the "

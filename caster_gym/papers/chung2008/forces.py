@@ -64,7 +64,7 @@ def section() -> Section:
     in_world = _apart(motion.in_world(forces.exact), motion.in_world(forces.bare))
     significant = Difference(
         "E14",
-        "chung2008, V, Figs. 8 and 9",
+        "V, Figs. 8 and 9",
         "significant differences at F_x, F_y and M_z between the models with and without wheels",
         "at F_y and M_z only, in the body frame in which the inertia matrices are given",
         f"Greatest difference over greatest force without wheels: {apart[0]:.1%}, {apart[1]:.1%}, {apart[2]:.1%}. "

@@ -168,7 +168,7 @@ def differences(model: Model) -> tuple[Difference, ...]:
     return (
         Difference(
             "E17",
-            "chung2008, section 5, Figs. 16 to 19",
+            "section 5, Figs. 16 to 19",
             "the impulse over all directions is an ellipse",
             "1/(nᵀ W n) is not the radius of an ellipse, 1/√(nᵀ W n) would be; with ρ = greatest/least it bulges over "
             "the ellipse with its half axes by (ρ + 1)/(2√ρ) − 1, and is dented for ρ > 2",
@@ -177,7 +177,7 @@ def differences(model: Model) -> tuple[Difference, ...]:
         ),
         Difference(
             "E16",
-            "chung2008, (57) to (60)",
+            "(57) to (60)",
             "u̇ is the velocity of the contact point, and the impulse acts along n in the space of u̇",
             "true if the line of impact passes C; at a point P, (C1): n = (n_x, n_y, P_x n_y − P_y n_x)",
             f"Fig. 16, wall with n = (0, 1) met at P = (0.1 m, 0): {right:.2f} N s; by (60) {printed:.2f} N s",

@@ -252,14 +252,14 @@ def mass_evidence(robot: Robot) -> tuple[Table, tuple[Check, ...], tuple[Differe
     )
     difference = Difference(
         "E1",
-        "chung2008, Table 2",
+        "Table 2",
         "link 0.025 kg, platform 0.025 kg",
         "link 0.1 kg, platform 5 kg; 0.025 is ½ m_pl b² of the platform in kg m²",
         evidence,
     )
     contact = Difference(
         "E13",
-        "chung2008, (44), (52)",
+        "(44), (52)",
         "forces at the contact of wheel and floor enter as (O_iA_i − r k) × F_ext",
         "they do not enter: the contact point is at rest and a force on it does no work",
         "By (35) and (36) the velocity of the contact point is zero for every η̇, θ̇ and φ̇; see the check of (44).",

@@ -226,7 +226,7 @@ def _difference(results: dict[str, Result]) -> Difference:
     around, along, same = results["circle"], results["ellipse"], results["same"]
     return Difference(
         "E15",
-        "chung2008, V, Figs. 13 to 15",
+        "V, Figs. 13 to 15",
         "as the wheel mass increases, the forces in x, y and θ_z increase drastically compared to the circle",
         "in newtons all three do; in proportion the force in y changes less than on the circle, since the wheels are "
         "25 % of the platform here and 60 % there",

@@ -166,6 +166,7 @@ def _differences(sample: Sample, rows_of_37: str) -> tuple[Difference, ...]:
     printed = KIM2001_INVERSE[2](sample.phi, sample.lengths)
     broken = float(np.abs(printed[:, 0] + printed[:, 2] - [0.0, 0.0, 1.0]).max())
     mended = _not_inverse(KIM2001_FORWARD[2], KIM2001_INVERSE[2], sample, True)
+    three = compare(KIM2001_THREE, sample.robot, sample.phi)
     four = KIM2001_FOUR(sample.phi, sample.lengths)
     passive = KIM2001.inverse_jacobian(sample.robot, sample.phi)[:, :2, :2].reshape(COUNT, 4, 3)
     is_eta = float(np.abs(four - passive).max())
@@ -181,6 +182,14 @@ def _differences(sample: Sample, rows_of_37: str) -> tuple[Difference, ...]:
             "b r cos φ₃",
             f"as printed η̇₃ is off by up to {third.by:.3g} per unit of ω, and the rows break η̇ + φ̇ = ω by as much "
             f"({broken:.3g}); corrected it is the inverse of (17) within {mended:.0e}",
+        ),
+        Difference(
+            KIM2001_THREE.tag,
+            "(24), row 3, column 3",
+            "d r − d r cos φ₃",
+            "d r − b r cos φ₃",
+            f"the text takes the third row of (22), where b stands; as printed φ̇₃ is off by up to {three.by:.3g} per "
+            "unit of ω",
         ),
         Difference(
             KIM2001_FOUR.tag,
