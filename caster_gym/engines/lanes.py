@@ -61,12 +61,20 @@ def write(block: Any, lane: Any, row: Any, values: tuple[Any, ...]) -> None:
 
 @overload(read, jit_options=INLINE, strict=False)
 def _read(block: Any, lane: Any, row: Any, like: Any) -> Any:
-    if len(like) == 1:
-        return lambda block, lane, row, like: (block[row * LANES + lane],)
     half = len(like) // 2
-    return lambda block, lane, row, like: (
-        read(block, lane, row, like[:half]) + read(block, lane, row + half, like[half:])
-    )
+    if len(like) > 3:
+        return lambda block, lane, row, like: (
+            read(block, lane, row, like[:half]) + read(block, lane, row + half, like[half:])
+        )
+    return [
+        lambda block, lane, row, like: (block[row * LANES + lane],),
+        lambda block, lane, row, like: (block[row * LANES + lane], block[(row + 1) * LANES + lane]),
+        lambda block, lane, row, like: (
+            block[row * LANES + lane],
+            block[(row + 1) * LANES + lane],
+            block[(row + 2) * LANES + lane],
+        ),
+    ][len(like) - 1]
 
 
 @overload(write, jit_options=INLINE, strict=False)
@@ -74,12 +82,21 @@ def _write(block: Any, lane: Any, row: Any, values: Any) -> Any:
     def write_one(block: Any, lane: Any, row: Any, values: Any) -> None:
         block[row * LANES + lane] = values[0]
 
+    def write_two(block: Any, lane: Any, row: Any, values: Any) -> None:
+        block[row * LANES + lane] = values[0]
+        block[(row + 1) * LANES + lane] = values[1]
+
+    def write_three(block: Any, lane: Any, row: Any, values: Any) -> None:
+        block[row * LANES + lane] = values[0]
+        block[(row + 1) * LANES + lane] = values[1]
+        block[(row + 2) * LANES + lane] = values[2]
+
     def write_halves(block: Any, lane: Any, row: Any, values: Any) -> None:
         write(block, lane, row, values[:half])
         write(block, lane, row + half, values[half:])
 
     half = len(values) // 2
-    return write_one if len(values) == 1 else write_halves
+    return [write_one, write_two, write_three][len(values) - 1] if len(values) < 4 else write_halves
 
 
 def counting(like: tuple[Any, ...]) -> tuple[int, ...]:

@@ -21,6 +21,7 @@ import numpy as np
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
+from caster_gym.engines.numba_loops import INLINE
 from caster_gym.mechanics import (
     actuation,
     caster,
@@ -38,8 +39,9 @@ from caster_gym.mechanics import (
     separation,
 )
 
+__all__ = ["INLINE", "announce_compilation", "borrowed", "compiled", "teach"]
+
 _PACKAGE = Path(__file__).resolve().parent.parent
-INLINE: Any = {"forceinline": True}  # Numba names the type of its options in stubs only
 _SETTINGS: Any = numba.config  # makes its attributes at run time
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
 _LOOPS_AND_CHOICES |= {
@@ -148,79 +150,6 @@ def _memory(nothing: Any, count: Any) -> Any:
 @overload(scalars.sqrt, jit_options=INLINE, strict=False)
 def _sqrt(x: Any) -> Any:
     return lambda x: math.sqrt(x)
-
-
-@overload(scalars.add, jit_options=INLINE, strict=False)
-def _add(a: Any, b: Any) -> Any:
-    if len(a) == 1:
-        return lambda a, b: (a[0] + b[0],)
-    half = len(a) // 2
-    return lambda a, b: scalars.add(a[:half], b[:half]) + scalars.add(a[half:], b[half:])
-
-
-@overload(scalars.total, jit_options=INLINE, strict=False)
-def _total(terms: Any) -> Any:
-    if len(terms) == 1:
-        return lambda terms: terms[0]
-    if len(terms) < 5:
-        return lambda terms: scalars.add(scalars.total(terms[:-1]), terms[-1])
-    return (
-        lambda terms: scalars.add(  # four at a time, since the compiler's recursion is limited
-            scalars.add(scalars.add(scalars.add(scalars.total(terms[:-4]), terms[-4]), terms[-3]), terms[-2]), terms[-1]
-        )
-    )
-
-
-@overload(scalars.greatest, jit_options=INLINE, strict=False)
-def _greatest(values: Any) -> Any:
-    if len(values) == 1:
-        return lambda values: values[0]
-    return lambda values: scalars.maximum(values[-1], scalars.greatest(values[:-1]))
-
-
-@overload(scalars.pairs, jit_options=INLINE, strict=False)
-def _pairs(flat: Any) -> Any:
-    if len(flat) == 2:
-        return lambda flat: ((flat[0], flat[1]),)
-    half = len(flat) // 4 * 2
-    return lambda flat: scalars.pairs(flat[:half]) + scalars.pairs(flat[half:])
-
-
-@overload(scalars.flatten, jit_options=INLINE, strict=False)
-def _flatten(nested: Any) -> Any:
-    if len(nested) == 0:
-        return lambda nested: ()
-    if len(nested) == 1:
-        return lambda nested: nested[0]
-    half = len(nested) // 2
-    return lambda nested: scalars.flatten(nested[:half]) + scalars.flatten(nested[half:])
-
-
-@overload(scalars.each, jit_options=INLINE, strict=False)
-def _each(function: Any, shared: Any, *columns: Any) -> Any:
-    count = len(columns[0])
-    half = count // 2
-    if count == 0:
-        return lambda function, shared, *columns: ()
-    if len(columns) == 1:
-        if count == 1:
-            return lambda function, shared, *columns: (function(*shared, columns[0][0]),)
-        return lambda function, shared, *columns: (
-            scalars.each(function, shared, columns[0][:half]) + scalars.each(function, shared, columns[0][half:])
-        )
-    if len(columns) == 2:
-        if count == 1:
-            return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0]),)
-        return lambda function, shared, *columns: (
-            scalars.each(function, shared, columns[0][:half], columns[1][:half])
-            + scalars.each(function, shared, columns[0][half:], columns[1][half:])
-        )
-    if count == 1:
-        return lambda function, shared, *columns: (function(*shared, columns[0][0], columns[1][0], columns[2][0]),)
-    return lambda function, shared, *columns: (
-        scalars.each(function, shared, columns[0][:half], columns[1][:half], columns[2][:half])
-        + scalars.each(function, shared, columns[0][half:], columns[1][half:], columns[2][half:])
-    )
 
 
 for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):

@@ -20,11 +20,18 @@ from caster_gym.engines.lanes import (
     to_lanes,
     write,
 )
+from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import INLINE, compiled
 from caster_gym.engines.threads import over_blocks
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import pack_state, rk4_step
-from caster_gym.mechanics.parameters import Dynamics, pack_parameters, robot_parameters
+from caster_gym.mechanics.parameters import (
+    CASTER_FIELDS,
+    PLATFORM_FIELDS,
+    Dynamics,
+    pack_parameters,
+    robot_parameters,
+)
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance
 from caster_gym.robot import Robot
 
@@ -145,6 +152,8 @@ class Fleet:
         dynamics: Dynamics = "exact",
         around: Surroundings | None = None,
     ) -> None:
+        if isinstance(robots, Robot):
+            check_memory(count or 1, BODY_ROWS + PLATFORM_FIELDS + (4 + CASTER_FIELDS) * robots.caster_count)
         listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
         if not listed or (count is not None and len(listed) != count):
             raise ValueError(f"a fleet needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")

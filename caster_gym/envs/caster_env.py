@@ -49,20 +49,12 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         actions = np.asarray(action, dtype=np.float32)
         if actions.shape != self.action_space.shape:
             raise ValueError(f"action must have shape {self.action_space.shape}, got {actions.shape}")
-        if np.isnan(actions).any():
-            raise ValueError(f"action must hold numbers, got {action}")
         if not self._started:
             raise RuntimeError("reset the environment before its first step")
-        outcome = self.engine.step(actions[None])
+        observation, reward, terminated, truncated, report = self.engine.step_alone(np.ascontiguousarray(actions))
         if self.render_mode == "human":
             self.render()
-        return (
-            outcome.observations[0],
-            float(outcome.rewards[0]),
-            bool(outcome.terminated[0]),
-            bool(outcome.truncated[0]),
-            self.engine.info_of_one(outcome.reports[:, 0]),
-        )
+        return observation, reward, terminated, truncated, self.engine.info_of_one(report)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The present moment as an image (height, width, 3), or in a window, as `render_mode` says."""

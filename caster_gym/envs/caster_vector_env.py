@@ -77,7 +77,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self._observations = np.where(mask[:, None], outcome.observations, self._observations)
         if self.render_mode == "human":
             self.render()
-        return self._observations.copy(), _masked(self.engine.info(outcome.reports), mask)
+        return self._observations, _masked(self.engine.info(outcome.reports), mask)
 
     def step(
         self, actions: NDArray[np.float32]
@@ -108,7 +108,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self._observations = outcome.observations
         if self.render_mode == "human":
             self.render()
-        return outcome.observations.copy(), outcome.rewards, outcome.terminated, outcome.truncated, infos
+        return outcome.observations, outcome.rewards, outcome.terminated, outcome.truncated, infos
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]  # Gymnasium's type has tuples of frames
         """The first 16 robots in a grid: one image (height, width, 3), or a window, as `render_mode` says.
@@ -166,12 +166,23 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
 
 
 def _masked(infos: dict[str, Any], mask: Flags) -> dict[str, Any]:
-    """Infos with a mask `_key` beside each key, as Gymnasium's vector environments give them."""
+    """Infos with a mask `_key` beside each key, the same for all, as Gymnasium's vector environments give them."""
     result: dict[str, Any] = {}
     for key, value in infos.items():
         result[key] = _masked(value, mask) if isinstance(value, dict) else value
-        result[f"_{key}"] = mask.copy()
+        result[_MASK_OF[key]] = mask
     return result
+
+
+class _MaskNames(dict[str, str]):
+    """The names of masks, each made once."""
+
+    def __missing__(self, key: str) -> str:
+        self[key] = name = f"_{key}"
+        return name
+
+
+_MASK_OF = _MaskNames()
 
 
 def check_counts(num_envs: int, max_episode_steps: int | None) -> None:

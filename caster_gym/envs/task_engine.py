@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.engines.held import Held
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
+from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import block_layout as layout
@@ -72,6 +74,7 @@ class TaskEngine:
         self._sizes = layout.Sizes(
             tuple(range(robot.caster_count)), tuple(range(len(observed.preview))), tuple(range(observed.nearest))
         )
+        check_memory(count, layout.desk_rows(self._sizes))
         self._spread = np.array([pace.start_offset, pace.start_turn])
         self._report_rows = layout.FIXED_REPORT_ROWS + 2 * robot.caster_count
         nominal = np.array([pack_parameters(robot_parameters(robot))])
@@ -93,6 +96,8 @@ class TaskEngine:
             substeps=pace.substeps,
             time_step=pace.time_step,
         )
+        if count == 1:
+            self._held, self._results = Held((self._world, self._desk)), np.zeros(3)
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
@@ -140,12 +145,25 @@ class TaskEngine:
         reports = np.empty((self._report_rows, self.count))
         results = np.empty((3, self.count))
         views = layout.Views(observations, reports, results)
-        if self.count == 1:
-            kernel.step_single(self._world, actions, views, self._desk, self._sizes)
-        else:
-            over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
+        over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
         self._reports = reports
         return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
+
+    def step_alone(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, NDArray[np.float64]]:
+        """Move the only robot there is for a control period: observation, reward, terminated, truncated, report.
+
+        Faster than `step`, and the same to the last bit. Raises ValueError for an action (driven joints,) that is not a
+        number.
+        """
+        observation = np.empty(self.layout.size, dtype=np.float32)
+        report = np.empty(self._report_rows)
+        if not kernel.step_single(self._held, action, observation, report, self._results, self._sizes):
+            raise ValueError(f"action must hold numbers, got {action}")
+        self._reports = report[:, None]
+        reward, failed, late = self._results.tolist()
+        return observation, reward, failed > 0.0, late > 0.0, report
 
     def _empty(self) -> Outcome:
         size, count = self.layout.size, self.count

@@ -295,7 +295,8 @@ def _give_results(desk: Any, here: Any, robot: Any, world: World, views: Views, 
 def _copy(source: Any, target: Any, lane: Any, lanes: Any, rows: Any) -> None:
     """Copy the first rows of all lanes, or of one."""
     if lanes == LANES:
-        target[: rows * LANES] = source[: rows * LANES]
+        for i in range(rows * LANES):
+            target[i] = source[i]
     else:
         for row in range(rows):
             target[row * LANES + lane] = source[row * LANES + lane]
@@ -343,9 +344,26 @@ def _step_block(i: Any, world: World, actions: Any, views: Views, desk: Any, siz
     _step_lanes(i, LANES, _look_at_all, world, actions, views, desk, sizes)
 
 
-def _step_single(world: World, actions: Any, views: Views, desk: Any, sizes: Sizes) -> None:
-    world, views, desk = _borrowed_world(world), _borrowed_views(views), borrowed(desk)
-    _step_lanes(0, 1, _look_at_first, world, actions, views, desk, sizes)
+@register_jitable(**INLINE)
+def _one_row(numbers: Any) -> Any:
+    return borrowed(numbers).reshape((1, len(numbers)))
+
+
+@register_jitable(**INLINE)
+def _one_column(numbers: Any) -> Any:
+    return borrowed(numbers).reshape((len(numbers), 1))
+
+
+def _step_single(held: Any, action: Any, observation: Any, report: Any, results: Any, sizes: Sizes) -> bool:
+    """One control period of a single robot; nothing happens, and False comes back, if the action is not a number."""
+    for i in range(len(action)):
+        if action[i] != action[i]:
+            return False
+    world, desk = held.content
+    world, desk = _borrowed_world(world), borrowed(desk)
+    views = Views(_one_row(observation), _one_column(report), _one_column(results))
+    _step_lanes(0, 1, _look_at_first, world, _one_row(action), views, desk, sizes)
+    return True
 
 
 def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
