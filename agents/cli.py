@@ -26,6 +26,7 @@ app = typer.Typer(
     help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
 )
 
+NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 
 Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
@@ -154,7 +155,7 @@ def reproduce(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that page and its folder.")] = False,
 ) -> None:
     """Compute everything that a paper computes: figures, tables, and a page with each printed number beside ours."""
-    with _plain_errors():
+    with _plain_errors(NOTHING_WRITTEN):
         from .reproduction import find_paper
         from .reproduction import reproduce as run
 
@@ -187,7 +188,7 @@ def design(
     ] = None,
 ) -> None:
     """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
-    with _plain_errors():
+    with _plain_errors(NOTHING_WRITTEN):
         from .design import design as run
         from .design import read_design
 
@@ -235,15 +236,15 @@ def _parsed(changes: list[str] | None) -> dict[str, Any]:
 
 
 @contextmanager
-def _plain_errors() -> Iterator[None]:
-    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C."""
+def _plain_errors(interrupted: str = "what was finished is kept") -> Iterator[None]:
+    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C that says what is left."""
     try:
         yield
     except (ValueError, OSError, DependencyNotInstalled) as error:
         typer.echo(f"caster-gym: {error}", err=True)
         raise typer.Exit(2) from error
     except KeyboardInterrupt:
-        typer.echo("caster-gym: interrupted; what was finished is kept", err=True)
+        typer.echo(f"caster-gym: interrupted; {interrupted}", err=True)
         raise typer.Exit(130) from None
 
 

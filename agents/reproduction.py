@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from caster_gym.configuration import did_you_mean
-from caster_gym.papers.page import Section, write_differences, write_page
+from caster_gym.papers.page import Section, differences_page, write_page
 
 from .provenance import write_provenance
-from .run_folder import check_free, staged
+from .run_folder import MARK, check_free, replace_file, staged
 
 
 class Paper(NamedTuple):
@@ -77,7 +77,7 @@ def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int]
     report is told what comes next and how many parts are done. What was there before stays until all is computed.
     """
     paper = find_paper(name)
-    check_free(out / name, overwrite)
+    _check_out(name, out, overwrite)
     sections = []
     for done, (work, place) in enumerate(paper.parts.items()):
         report(work, done)
@@ -86,11 +86,23 @@ def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int]
     with staged(out / name, overwrite) as fresh:
         page = write_page(name, paper.title, paper.reference, sections, fresh)
         write_provenance(fresh, paper=name)
-        (out / f"{name}.md").write_text(page, encoding="utf-8")
-    write_differences(out, tuple(PAPERS))
+    replace_file(out / f"{name}.md", page)
+    replace_file(out / "differences.md", differences_page(out, tuple(PAPERS)))
     checks = [check for section in sections for check in section.checks]
     unexplained = tuple(check.what for check in checks if not check.agrees and not check.remark)
     return Verdict(sum(check.agrees for check in checks), len(checks), unexplained)
+
+
+def _check_out(name: str, out: Path, overwrite: bool) -> None:
+    """Refuse a folder that cannot be had, and one with pages of the same names that are not ours."""
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"{out} is a file; --out needs a folder")
+    check_free(out / name, overwrite)
+    page, differences = out / f"{name}.md", out / "differences.md"
+    if page.exists() and not (out / name / MARK).is_file():
+        raise ValueError(f"{page} is there already, and not from caster-gym; choose another --out")
+    if differences.exists() and not any((out / paper / MARK).is_file() for paper in PAPERS):
+        raise ValueError(f"{differences} is there already, and not from caster-gym; choose another --out")
 
 
 def _build(place: str) -> Section:

@@ -40,10 +40,23 @@ def staged(folder: Path, overwrite: bool) -> Iterator[Path]:
     check_free(folder, overwrite)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
-        fresh = Path(temporary) / folder.name
+        fresh, old = Path(temporary) / folder.name, Path(temporary) / "old"
         fresh.mkdir()
         yield fresh
         (fresh / MARK).touch()
         if folder.exists():
-            shutil.rmtree(folder)
-        fresh.rename(folder)
+            folder.rename(old)
+        try:
+            fresh.rename(folder)
+        except BaseException:
+            if old.exists():
+                old.rename(folder)
+            raise
+
+
+def replace_file(file: Path, text: str) -> None:
+    """Write a text file at once: whoever reads it finds the old one or the new one, whole."""
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, delete=False) as fresh:
+        fresh.write(text)
+    Path(fresh.name).chmod(0o644)
+    Path(fresh.name).replace(file)

@@ -54,6 +54,28 @@ def test_what_fails_leaves_the_results_of_before(papers, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["broken"]
 
 
+@pytest.mark.parametrize("name", ["explained.md", "differences.md"])
+def test_pages_of_somebody_else_stay(papers, tmp_path, name):
+    (tmp_path / name).write_text("my thesis")
+    with pytest.raises(ValueError, match=f"{name} is there already, and not from caster-gym"):
+        reproduce("explained", tmp_path, True, lambda *_: None)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "my thesis"
+
+
+def test_our_own_pages_are_replaced_only_if_told_to(papers, tmp_path):
+    reproduce("explained", tmp_path, False, lambda *_: None)
+    with pytest.raises(ValueError, match="is not empty"):
+        reproduce("explained", tmp_path, False, lambda *_: None)
+    assert reproduce("explained", tmp_path, True, lambda *_: None).compared == 2
+
+
+def test_a_file_is_no_folder(papers, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match="file is a file; --out needs a folder"):
+        reproduce("explained", tmp_path / "file", False, lambda *_: None)
+
+
 def test_a_difference_without_a_reason_is_an_error_of_the_command(papers, tmp_path):
     result = CliRunner().invoke(app, ["reproduce", "unexplained", "--out", str(tmp_path)])
     assert result.exit_code == 2

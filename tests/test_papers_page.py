@@ -12,8 +12,8 @@ from caster_gym.papers.page import (
     Section,
     Table,
     check_number,
+    differences_page,
     markdown_table,
-    write_differences,
     write_page,
 )
 from caster_gym.robot import load_robot
@@ -79,8 +79,7 @@ def test_differences_of_all_papers_stand_in_the_order_of_their_numbers(tmp_path)
     for name, tags in (("one", ("E10", "E2")), ("two", ("E3",))):
         (tmp_path / name).mkdir()
         write_page(name, name, "", [section(name=tag, tag=tag) for tag in tags], tmp_path / name)
-    write_differences(tmp_path, ("one", "two", "not reproduced yet"))
-    page = (tmp_path / "differences.md").read_text(encoding="utf-8")
+    page = differences_page(tmp_path, ("one", "two", "not reproduced yet"))
     assert page.index("## [one]") < page.index("| E2 |") < page.index("| E10 |") < page.index("## [two]")
     assert page.index("## [two]") < page.index("| E3 |")
     assert "it rained" in page

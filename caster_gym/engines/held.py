@@ -17,14 +17,15 @@ class HeldType(types.StructRef):  # type: ignore[misc]  # Numba has no types
     """What compiled code knows of a `Held`."""
 
 
-class Held(structref.StructRefProxy):  # type: ignore[misc]
+class Held(structref.StructRefProxy):
     """Holds a tuple; `content` gives it back in compiled code."""
 
     def __new__(cls, content: Any) -> Any:
         return _hold(content)
 
 
-structref.define_proxy(Held, HeldType, ["content"])
+_define: Any = structref.define_proxy  # Numba ships it without types
+_define(Held, HeldType, ["content"])
 
 
 def _holding(content: Any) -> Any:

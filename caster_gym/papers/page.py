@@ -97,8 +97,8 @@ def write_page(name: str, title: str, reference: str, sections: Sequence[Section
     return _page(name, title, reference, sections, checks)
 
 
-def write_differences(out: Path, names: Sequence[str]) -> None:
-    """OUT/differences.md: where each paper and we differ, of all papers whose folders are there."""
+def differences_page(out: Path, names: Sequence[str]) -> str:
+    """The page of all differences, of all papers whose folders are there."""
     parts = [
         "# Where the papers and we differ",
         "Each with the evidence that decides, as measured by `caster-gym reproduce`.",
@@ -111,7 +111,7 @@ def write_differences(out: Path, names: Sequence[str]) -> None:
             rows.sort(key=lambda row: int(row[0].removeprefix("E")))
             columns = ("", "where", "as printed", "correct", "evidence")
             parts += [f"## [{name}]({name}.md)", markdown_table(columns, rows)]
-    (out / "differences.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    return "\n\n".join(parts) + "\n"
 
 
 def _page(name: str, title: str, reference: str, sections: Sequence[Section], checks: Sequence[Check]) -> str:
