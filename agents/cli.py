@@ -1,4 +1,4 @@
-"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, export."""
+"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, identify, export."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -200,6 +200,48 @@ def design(
 
             words = run(settings, out, overwrite, report)
         typer.echo(f"{words} The page, the picture, the table of motors and the robot file are in {out}.")
+
+
+@app.command()
+def identify(
+    recording: Annotated[
+        Path | None, typer.Argument(help="CSV file of a recording; --example shows the format.")
+    ] = None,
+    robot: Annotated[
+        str, typer.Option(help="The robot as it is thought to be: its name, or path of a YAML file.")
+    ] = "chung2008",
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
+            "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail. Without it: mass and place of a "
+            "payload."
+        ),
+    ] = None,
+    example: Annotated[Path | None, typer.Option(help="Write an example recording to this CSV file instead.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the example.", min=0, max=2**32 - 1)] = 0,
+    out: Out = Path("runs/identify"),
+    overwrite: Overwrite = False,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a setting, e.g. --set window=0.5 or --set 'noise={position: 0.001}'."),
+    ] = None,
+) -> None:
+    """Payload, friction and trail of a robot from a recording: estimates with intervals, a page and a robot file."""
+    with _plain_errors(NOTHING_WRITTEN):
+        from .identify import PAYLOAD, read_identify, write_example
+        from .identify import identify as run
+
+        if example is not None and recording is None:
+            typer.echo(write_example(example, robot, seed, overwrite))
+            return
+        if recording is None or example is not None:
+            raise ValueError("give either a recording, or --example with the file to write one to")
+        settings = read_identify(robot, unknown or PAYLOAD, _parsed(change))
+        with tqdm(desc="identify", unit="step") as bar:
+            words = run(recording, settings, out, overwrite, bar.update)
+        typer.echo(words)
+        typer.echo(f"The page, the figure and robot.yaml are in {out}.")
 
 
 @app.command()

@@ -1,7 +1,6 @@
 """Recordings of a robot that moves under known torques: CSV files, and examples from the simulator.
 
-A file has one row a sample, at a constant time step, and a header that names each column with its unit. In this order or
-another:
+A file has one row a sample, at a constant time step, and a header that names each column with its unit. In any order:
 
     time [s]                           of the sample
     x [m], y [m], heading [rad]        pose of C in the world; the heading may wrap or not
@@ -10,8 +9,8 @@ another:
     torque_roll_1 [N m], torque_steer_1 [N m], …      at the joints, held from this sample to the next
     motor_roll_1 [N m], motor_steer_1 [N m], …        instead of these: at the motors, which `gear` couples
 
-Lengths may be in m, cm or mm, angles in rad or deg, times in s or ms, torques in N m or mN m. Columns without a unit are
-in the first one given here.
+Lengths may be in m, cm or mm, angles in rad or deg, times in s or ms, torques in N m or mN m. Columns without a unit
+are in the first one given here.
 """
 
 import csv
@@ -64,7 +63,7 @@ class Noise(Frozen):
 
 KINDS = tuple(Noise.model_fields)
 KIND_UNITS = dict(zip(KINDS, ("m", "rad", "m/s", "rad/s", "rad"), strict=True))
-_KIND_OF_BODY = ("position", "position", "heading", "velocity", "velocity", "yaw_rate")
+_KIND_OF_BODY: tuple[str, ...] = ("position", "position", "heading", "velocity", "velocity", "yaw_rate")
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Recording:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kind of each component of a state x, y, β, vx, vy, ω, δ_1, …"""
-        return _KIND_OF_BODY + ("steering",) * self.steering.shape[1]
+        return (*_KIND_OF_BODY, *["steering"] * self.steering.shape[1])
 
     @property
     def observed(self) -> list[int]:
@@ -118,43 +117,48 @@ def record(
     share: float = 0.5,
     dynamics: Dynamics = "exact",
 ) -> Recording:
-    """A recording, without noise, of a robot that is shaken by all its driven joints at once.
+    """A recording, without noise, of a robot that its driven joints push along all its three degrees of freedom.
 
-    Each joint has a sum of sines of random phases; a drag on its rate, part of the torque that is recorded, keeps the
-    robot slow. share [-]: of the force on the floor that the weakest rolling motor has.
+    Each component of the force at C is a sum of sines of random phases less a drag on the twist, which keeps the robot
+    slow; the joints share it with the least sum of squared shares of their greatest torques, within these.
+    share [-]: of the greatest force that all rolling motors have together.
     """
     if not 0.0 < time_step <= seconds / FEWEST_ROWS:
-        raise ValueError(f"a recording needs at least {FEWEST_ROWS} steps, got {seconds:g} s in steps of {time_step:g} s")
+        raise ValueError(
+            f"a recording needs {FEWEST_ROWS} steps or more, got {seconds:g} s in steps of {time_step:g} s"
+        )
     rng, model = np.random.default_rng(seed), Model(robot, dynamics)
-    arms = np.array([arm for caster in robot.casters for arm in (caster.radius, caster.trail)])
-    driven = np.array([joint in robot.driven for joint in robot.joints])
-    force = share * min(caster.roll.max_torque / caster.radius for caster in robot.casters)
-    amplitude = np.where(driven, force * arms, 0.0)
-    drag = amplitude * arms / (_CRUISE * robot.top_speed)
-    phases = rng.uniform(-np.pi, np.pi, (len(_FREQUENCIES), len(arms)))
-    detuned = _FREQUENCIES[:, None] * rng.uniform(0.8, 1.25, phases.shape)
+    driven = [robot.joints.index(joint) for joint in robot.driven]
+    limits = np.array([motor.max_torque for caster in robot.casters for motor in (caster.roll, caster.steer)])[driven]
+    lengths = np.array([1.0, 1.0, model.characteristic_length])
+    force = share * sum(caster.roll.max_torque / caster.radius for caster in robot.casters) * lengths
+    drag = force * lengths / (_CRUISE * robot.top_speed)
+    phases = rng.uniform(-np.pi, np.pi, (len(_FREQUENCIES), 3))
+    frequencies = _FREQUENCIES[:, None] * rng.uniform(0.8, 1.25, phases.shape)
     count, substeps = round(seconds / time_step) + 1, substeps_of(robot, time_step)
     state = np.concatenate([np.zeros(6), rng.uniform(-np.pi, np.pi, robot.caster_count)])
     states, torques = [], []
     for k in range(count):
-        rates = model.jacobian(state[6:]) @ state[3:6]
-        waves = np.sin(2.0 * np.pi * detuned * k * time_step + phases).sum(axis=0) / len(_FREQUENCIES) ** 0.5
+        waves = np.sin(2.0 * np.pi * frequencies * k * time_step + phases).sum(axis=0) / len(_FREQUENCIES) ** 0.5
+        wrenches = limits[:, None] * model.jacobian(state[6:], robot.driven)
+        shares = np.linalg.lstsq(wrenches.T, force * waves - drag * state[3:6], rcond=1e-3)[0]
+        torque = np.zeros(len(robot.joints))
+        torque[driven] = limits * np.clip(shares, -1.0, 1.0)
         states.append(state)
-        torques.append(amplitude * waves - drag * rates)
-        state = model.simulate(state, torques[-1], time_step / substeps, substeps)[-1]
+        torques.append(torque)
+        state = model.simulate(state, torque, time_step / substeps, substeps)[-1]
     moved = np.array(states)
     return Recording(time_step, moved[:, :3], moved[:, 6:], np.array(torques), moved[:, 3:6])
 
 
-_FREQUENCIES = np.array([0.35, 0.8, 1.7, 3.1])  # [Hz]
-_CRUISE = 0.25  # [-] of the top speed at which the drag equals a joint's amplitude
-_FINER = 2.0  # [-] times the coarsest step allowed: the error of RK4 falls by 16
+_FREQUENCIES = np.array([0.2, 0.5, 1.1, 2.3])  # [Hz]
+_CRUISE = 0.25  # [-] of the top speed at which the drag equals the amplitude of each sine
 
 
 def substeps_of(robot: Robot, time_step: float) -> int:
-    """RK4 steps in a time step [s], each half as long as the coarsest that `Robot.check_time_step` lets pass."""
+    """RK4 steps in a time step [s], as few as `Robot.check_time_step` lets pass."""
     longest = min(caster.trail for caster in robot.casters) / robot.top_speed
-    return math.ceil(_FINER * time_step / longest * (1.0 - 1e-9))
+    return math.ceil(time_step / longest * (1.0 - 1e-9))
 
 
 def write_recording(path: Path, recording: Recording) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from caster_gym.configuration import did_you_mean
+from caster_gym.configuration import did_you_mean, parse
 from caster_gym.mechanics.parameters import Dynamics, PlatformParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Scalar
 from caster_gym.robot import Caster, Robot
@@ -27,7 +27,7 @@ UNITS = {
     "trail": "m",
 }
 _OF_CASTERS = tuple(UNITS)[4:]
-_SIGNED = ("payload_mass", "payload_x", "payload_y")  # may be negative in a robot file
+SIGNED = ("payload_mass", "payload_x", "payload_y")  # may be negative in a robot file
 
 
 class Unknown(NamedTuple):
@@ -115,9 +115,7 @@ def with_load(
     )
 
 
-def parameters_with(
-    robot: Robot, values: Mapping[str, Scalar], dynamics: Dynamics = "exact"
-) -> RobotParameters:
+def parameters_with(robot: Robot, values: Mapping[str, Scalar], dynamics: Dynamics = "exact") -> RobotParameters:
     """The numbers of a robot with some values replaced; values of any kind of scalar. A payload has a mass."""
     plain = robot_parameters(robot, dynamics)
     of_casters = {name: value for name, value in values.items() if name in _OF_CASTERS}
@@ -130,12 +128,12 @@ def parameters_with(
 
 def robot_with(robot: Robot, values: Mapping[str, float]) -> Robot:
     """The robot with some values replaced, its payload part of the platform; friction below zero becomes zero."""
-    possible = {name: value if name in _SIGNED else max(value, 0.0) for name, value in values.items()}
+    possible = {name: value if name in SIGNED else max(value, 0.0) for name, value in values.items()}
     p = parameters_with(robot, possible).platform
     platform = robot.platform.model_copy(update={"mass": p.mass, "inertia": p.inertia, "com": (p.com_x, p.com_y)})
     casters = tuple(_caster_with(caster, possible) for caster in robot.casters)
     changed = {"platform": platform, "casters": casters}
-    return Robot.model_validate(robot.model_copy(update=changed).model_dump())
+    return parse(Robot, robot.model_copy(update=changed).model_dump(), f"robot {robot.name!r} as identified")
 
 
 def _caster_with(caster: Caster, values: Mapping[str, float]) -> Caster:

@@ -1,0 +1,288 @@
+"""What a recording tells of a robot: estimates by maximum likelihood, with intervals, and what it does not tell.
+
+Measured quantities carry independent normal errors, of one standard deviation for each kind of quantity; torques are
+taken as they stand in the recording. Windows of the recording are predicted by the simulator, initial states estimated
+with the unknowns. See `caster_gym.analysis.shooting` and `caster_gym.analysis.window_fit`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.analysis.recording import KIND_UNITS, Noise, Recording
+from caster_gym.analysis.shooting import Shooting
+from caster_gym.analysis.unknowns import SIGNED, Unknown, check_alike, check_names, robot_with, unknowns, values_of
+from caster_gym.analysis.window_fit import Fit, Normal, Told, fit, point_at
+from caster_gym.mechanics.parameters import Dynamics
+from caster_gym.robot import Robot
+
+Array = NDArray[np.float64]
+
+WINDOW = 1.0  # [s]
+CONFIDENCE = 0.95
+_SHORT = 0.25  # [-] of a window, for a first fit that far starting values do not lead astray
+_LEAST_NOISE = 1e-9  # [m, rad, …] standard deviation below which rounding and time steps decide
+_EXACT = 1e-5  # [-] of a quantity's own variation: errors so small are those of time steps, not of a sensor
+_SURE = 4.0  # standard deviations beyond which chance no longer explains a misfit
+_PART = 0.1  # [-] share of a direction from which an unknown takes part in it
+
+
+class Agreement(NamedTuple):
+    """How the errors that are left compare with noise, for one kind of quantity."""
+
+    kind: str
+    unit: str
+    before: float  # root mean square error with the starting values, from the initial states of the estimates
+    left: float  # standard deviation of the errors that are left, for the freedom that was used
+    noise: float  # standard deviation of the noise: as given, else from one sample to the next
+    given: bool
+    explained: bool  # the errors are noise, or too small to be that of a sensor
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a recording tells. Arrays are in the order of `unknowns`."""
+
+    robot: Robot  # with the estimates
+    unknowns: tuple[Unknown, ...]
+    estimates: Array  # (P,)
+    deviations: Array  # (P,) standard deviations; infinite where an unknown is not told
+    half_widths: Array  # (P,) of the intervals
+    correlations: Array  # (P, P); not a number where an unknown is not told
+    confidence: float
+    agreements: tuple[Agreement, ...]
+    untold: tuple[str, ...]  # sentences: what the recording cannot tell
+    warnings: tuple[str, ...]  # sentences: what the intervals do not cover
+    shooting: Shooting
+    before: Array  # (W, S, observed) predicted with the starting values, from the same initial states
+    after: Array  # (W, S, observed) predicted with the estimates
+    steps: int
+
+    @property
+    def is_told(self) -> NDArray[np.bool_]:
+        """Which unknowns the recording tells."""
+        return np.isfinite(self.deviations)
+
+
+def identify(
+    robot: Robot,
+    recording: Recording,
+    names: Sequence[str],
+    starts: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    noise: Noise | None = None,
+    window: float = WINDOW,
+    confidence: float = CONFIDENCE,
+    dynamics: Dynamics = "exact",
+    report: Callable[[], None] = lambda: None,
+) -> Identification:
+    """The named unknowns of a robot, from a recording of it.
+
+    starts: values that differ from the robot file's, also of a payload that is known and not an unknown. noise:
+    standard deviations that are known; the others are estimated. window [s]. report is called before each step.
+    Raises ValueError for names that are not known, a recording of another number of casters, a window that is not
+    positive and a confidence that does not lie between 0 and 1.
+    """
+    starts, width = dict(starts or {}), _quantile(confidence)
+    if not window > 0.0:
+        raise ValueError(f"the window must be positive, got {window:g} s")
+    check_names([*starts, *(bounds or {})])
+    chosen = unknowns(robot, names, starts, bounds)
+    check_alike(robot, [*names, *starts])
+    if recording.steering.shape[1] != robot.caster_count:
+        raise ValueError(
+            f"the recording has {recording.steering.shape[1]} steering angles, but robot {robot.name!r} has "
+            f"{robot.caster_count} casters"
+        )
+    known = {**values_of(robot), **starts}
+    scales = np.array([one.scale for one in chosen])
+    limits = np.array([one.bounds for one in chosen], dtype=np.float64)
+    first = np.array([one.start for one in chosen])
+    levels = _Levels(recording, noise or Noise())
+    short, shooting = (Shooting(robot, recording, names, known, share * window, dynamics) for share in (_SHORT, 1.0))
+    rough = fit(short, short.first_guess(), first, scales, limits, levels.at_first, levels.update, np.inf, report)
+    nearer = short.starts_on(shooting, rough.point.path)
+    found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, report=report)
+    untold = found.told.untold  # what is not told goes back to where it started, which the recording does not notice
+    values = found.point.values + scales * (untold @ (untold.T @ ((first - found.point.values) / scales)))
+    agreements = _agreements(found, shooting, levels, first)
+    deviations, correlations = _spread(found, scales, agreements)
+    half_widths = deviations * width
+    return Identification(
+        robot=robot_with(robot, {**starts, **dict(zip(names, map(float, values), strict=True))}),
+        unknowns=chosen,
+        estimates=values,
+        deviations=deviations,
+        half_widths=half_widths,
+        correlations=correlations,
+        confidence=confidence,
+        agreements=agreements,
+        untold=tuple(_untold_words(found.told.untold, chosen)),
+        warnings=tuple(_warning_words(found, chosen, agreements, half_widths)),
+        shooting=shooting,
+        before=shooting.at_samples(shooting.predict(found.point.starts, first)),
+        after=shooting.at_samples(shooting.predict(found.point.starts, values)),
+        steps=rough.steps + found.steps,
+    )
+
+
+class _Left(NamedTuple):
+    """Errors that a fit leaves in each kind of quantity, over the standard deviations it was weighted with."""
+
+    variance: dict[str, float]  # for the freedom that was used
+    between: dict[str, float]  # the same from successive samples, in whose difference slow errors do not show
+    freedom: dict[str, float]
+
+
+class _Levels:
+    """Standard deviations of what a recording measured, given or estimated, one for each kind of quantity."""
+
+    def __init__(self, recording: Recording, given: Noise) -> None:
+        kinds = recording.kinds
+        self.kinds = [kinds[i] for i in recording.observed]
+        self.given = {kind: float(level) for kind, level in given if level is not None}
+        signals, angles = recording.measured.copy(), self.of("heading") | self.of("steering")
+        signals[:, angles] = np.unwrap(signals[:, angles], axis=0)
+        self.variation = {kind: float(signals[:, self.of(kind)].std(axis=0).max()) for kind in self.kinds}
+        # third differences: smooth motion adds little to them, white noise 20 times its variance
+        thirds = (np.diff(signals, 3, axis=0) ** 2).mean(axis=0) / 20.0
+        self.at_first = self._filled({kind: float(thirds[self.of(kind)].mean()) for kind in self.kinds})
+
+    def of(self, kind: str) -> NDArray[np.bool_]:
+        """Which observed components are of a kind."""
+        return np.array([own == kind for own in self.kinds])
+
+    def update(self, equations: Normal, known: Told, sigma: Array) -> Array:
+        """Standard deviations from the errors of a fit."""
+        left = self.left(equations, known).variance
+        weights = dict(zip(self.kinds, sigma, strict=True))
+        return self._filled({kind: left[kind] * weights[kind] ** 2 for kind in left})
+
+    def left(self, equations: Normal, known: Told) -> _Left:
+        """What a fit leaves. The fit bends errors towards zero along the columns of an orthonormal basis."""
+        windows, width = len(equations.errors), len(self.kinds)
+        shared = equations.across @ (known.directions / np.sqrt(known.strengths))
+        basis = np.concatenate([equations.q, shared], axis=2).reshape(
+            windows, -1, width, equations.q.shape[2] + shared.shape[2]
+        )
+        errors = equations.errors.reshape(windows, -1, width)
+        steps, bent = np.diff(errors, axis=1), np.diff(basis, axis=1)
+        found = _Left({}, {}, {})
+        for kind in dict.fromkeys(self.kinds):
+            of = self.of(kind)
+            free = errors[..., of].size - (basis[:, :, of] ** 2).sum()
+            found.freedom[kind] = float(free)
+            found.variance[kind] = float((errors[..., of] ** 2).sum() / free)
+            found.between[kind] = float(
+                (steps[..., of] ** 2).sum() / (2.0 * steps[..., of].size - (bent[:, :, of] ** 2).sum())
+            )
+        return found
+
+    def _filled(self, variances: Mapping[str, float]) -> Array:
+        levels = {kind: self.given.get(kind, variance**0.5) for kind, variance in variances.items()}
+        return np.array([max(levels[kind], _LEAST_NOISE) for kind in self.kinds])
+
+
+def _agreements(found: Fit, shooting: Shooting, levels: _Levels, first: Array) -> tuple[Agreement, ...]:
+    left = levels.left(found.normal, found.told)
+    before = point_at(shooting, found.point.starts, first).errors
+    agreements = []
+    for kind in left.variance:
+        of, given = levels.of(kind), kind in levels.given
+        sigma = float(found.sigma[of][0])
+        size = left.variance[kind] ** 0.5 * sigma
+        noise = sigma if given else left.between[kind] ** 0.5 * sigma
+        # variances of white noise scatter by 2/freedom; the logarithm of von Neumann's ratio by 1/freedom
+        excess = (
+            left.variance[kind] - 1.0
+            if given
+            else np.log(max(left.variance[kind], 1e-300) / max(left.between[kind], 1e-300))
+        )
+        chance = _SURE * ((2.0 if given else 1.0) / left.freedom[kind]) ** 0.5
+        explained = bool(excess < chance) or size < max(_EXACT * levels.variation[kind], _LEAST_NOISE)
+        rms = float(np.sqrt((before[..., of] ** 2).mean()))
+        agreements.append(Agreement(kind, KIND_UNITS[kind], rms, size, noise, given, explained))
+    return tuple(agreements)
+
+
+def _spread(found: Fit, scales: Array, agreements: Sequence[Agreement]) -> tuple[Array, Array]:
+    """Standard deviations and correlations of the estimates.
+
+    Where noise does not explain the errors, these count instead of it, and so does, if it is more, how far apart the
+    windows would have the estimates.
+    """
+    directions, strengths = found.told.directions, found.told.strengths
+    covariance = directions / strengths @ directions.T
+    excess = max((one.left / one.noise for one in agreements if one.given and not one.explained), default=1.0)
+    variances = np.diag(covariance) * max(excess, 1.0) ** 2
+    if not all(one.explained for one in agreements):
+        pulls = covariance @ found.normal.gradients.T
+        windows = len(found.normal.gradients)
+        variances = np.maximum(variances, (pulls**2).sum(axis=1) * windows / max(windows - 1, 1))
+    known = ((found.told.untold**2).sum(axis=1) < _PART**2) & ~found.at_bounds
+    deviations = np.where(known, scales * np.sqrt(variances), np.inf)
+    own = np.sqrt(np.where(known, np.diag(covariance), np.nan))
+    return deviations, covariance / np.outer(own, own)
+
+
+def _quantile(confidence: float) -> float:
+    """Half width of an interval in standard deviations."""
+    from scipy.stats import norm
+
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"the confidence must lie between 0 and 1, got {confidence:g}")
+    return float(norm.ppf(0.5 + 0.5 * confidence))
+
+
+def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
+    """A sentence for each direction that is not told, with as few unknowns in each as can be."""
+    from scipy.linalg import qr
+
+    if untold.shape[1] == 0:
+        return []
+    _, r, order = qr(untold.T, mode="economic", pivoting=True)
+    rows = np.zeros_like(r)
+    rows[:, order] = np.linalg.solve(r[:, : len(r)], r)
+    sentences = []
+    for row in rows:
+        parts = [(one, change * one.scale) for one, change in zip(chosen, row, strict=True) if abs(change) > _PART]
+        if len(parts) == 1:
+            sentences.append(f"The recording does not tell {parts[0][0].name}.")
+        else:
+            changes = ", ".join(f"{one.name} {change:+.3g} {one.unit}" for one, change in parts)
+            sentences.append(
+                f"The recording does not tell {' and '.join(one.name for one, _ in parts)} apart: it shows no "
+                f"difference when they change together ({changes})."
+            )
+    return sentences
+
+
+def _warning_words(
+    found: Fit, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
+) -> list[str]:
+    sentences = []
+    if not found.converged:
+        sentences.append(f"The fit did not settle within {found.steps} steps; the numbers are where it stopped.")
+    for one, value, at_bound in zip(chosen, found.point.values, found.at_bounds, strict=True):
+        if at_bound:
+            sentences.append(
+                f"{one.name} went to its bound of {value:.4g} {one.unit}; beyond it the fit would be better."
+            )
+    unexplained = [
+        f"{kind.kind} ({kind.left:.3g} instead of {kind.noise:.3g} {kind.unit})"
+        for kind in agreements
+        if not kind.explained
+    ]
+    if unexplained:
+        sentences.append(
+            f"The model does not explain the recording: more errors are left than noise in {', '.join(unexplained)}. "
+            "Something that is not among the unknowns differs. The intervals are widened by how much the windows "
+            "disagree, but may still be too narrow."
+        )
+    for one, value, half in zip(chosen, found.point.values, half_widths, strict=True):
+        if value + 2.0 * half < 0.0 and one.name not in SIGNED:
+            sentences.append(f"{one.name} comes out negative, which no robot has: the model misses something else.")
+    return sentences
