@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from caster_gym.analysis.design import Design, DesignTarget, optimise
+from caster_gym.analysis.design import Design, DesignTarget, check_designable, optimise
 from caster_gym.analysis.sizing import MotorRequirement, Requirement, require
 from caster_gym.analysis.target import driven_as
 from caster_gym.configuration import parse, read_yaml
@@ -35,14 +35,19 @@ COLUMNS = (
 )
 OBJECTIVES = {
     "isotropy": "global isotropy (1 is best)",
-    "torque": "greatest share of the torque that a motor has at its speed (1 is the limit)",
+    "torque": "largest motor torque, as a share of that in the file",
+    "use": "largest share of the torque that a motor has at its speed (1 is the limit)",
 }
 MEANINGS = {
     "isotropy": (
         "Isotropy is the mean over the steering angles of σ_min/σ_max of the driven joints' rates, as shares of the "
         "top speeds of their motors in the file, against velocities, as shares of the speed and yaw rate asked for."
     ),
-    "torque": "The margin is included; what a motor has is taken from the robot file.",
+    "torque": (
+        "The torque of each motor counts as a share of its `max_torque` in the robot file, so that unlike motors can "
+        "be compared; the margin is included. How fast the motors turn is not weighed: `objective: use` does."
+    ),
+    "use": "The margin is included; what a motor has is taken from the robot file.",
 }
 
 
@@ -64,10 +69,15 @@ class DesignReport:
 
 
 def read_design(target: str, robot: str | None = None, changes: Mapping[str, Any] | None = None) -> DesignSettings:
-    """Checked settings from a name in configs/designs or a YAML file, with some of them changed."""
+    """Settings from a name in configs/designs or a YAML file, with some of them changed.
+
+    Raises ValueError for settings that are wrong by themselves, and for those with which the robot cannot be designed.
+    """
     path = find("designs", target)
     content = {**read_yaml(path), **(changes or {}), **({} if robot is None else {"robot": robot})}
-    return parse(DesignSettings, content, str(path))
+    settings = parse(DesignSettings, content, str(path))
+    check_designable(load_robot(settings.robot), settings)
+    return settings
 
 
 def design(settings: DesignSettings, out: Path, overwrite: bool, report: Callable[[float], None]) -> str:
@@ -145,7 +155,7 @@ def page(report: DesignReport) -> str:
         "|---|---|---|---|",
         *(f"| {words} | {1e3 * r:.1f} | {1e3 * d:.1f} | {_use_words(value, 3)} |" for words, r, d, value in sizes),
         "",
-        f"{MEANINGS[settings.objective]} {_bound_words(design)}",
+        f"{MEANINGS[settings.objective]} {_bound_words(design)}{_speed_words(report)}",
         "",
         "![objective over radius and trail; motors asked for and there](design.png)",
         "",
@@ -174,6 +184,22 @@ def _bound_words(design: Design) -> str:
     if not design.bounds:
         return "The best design lies inside the bounds."
     return f"The best design lies at {' and at '.join(design.bounds)}: beyond it there may be better ones."
+
+
+def _speed_words(report: DesignReport) -> str:
+    """What the least torque costs in speed."""
+    if report.settings.objective != "torque":
+        return ""
+    fastest, earlier = (
+        max(requirement.motors, key=lambda motor: motor.speed / motor.has_speed)
+        for requirement in (report.after, report.before)
+    )
+    return (
+        f" Less torque has its price in speed: with the margin, the motor of {fastest.joint} turns at up to "
+        f"{fastest.speed:.3g} rad/s, {100 * fastest.speed / fastest.has_speed:.0f} % of its top speed in the file; as "
+        f"the robot was, the fastest by that measure turns at {earlier.speed:.3g} rad/s, "
+        f"{100 * earlier.speed / earlier.has_speed:.0f} %."
+    )
 
 
 def _payload_words(settings: DesignSettings) -> str:

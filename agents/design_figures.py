@@ -13,16 +13,16 @@ from caster_gym.render.palette import SERIES as COLOURS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEVELS = 12
-_WORST_SHOWN = 4.0  # [-] times the best value of a use: beyond, a design is too bad to tell apart
+_WORST_SHOWN = 4.0  # [-] times the best torque or use: beyond, a design is too bad to tell apart
 _TITLES = {
     "isotropy": "global isotropy, mean σmin/σmax [–]",
-    "torque": "greatest motor use [–], 1 (white line) is the limit",
+    "torque": "largest motor torque, share of the file's [–]",
+    "use": "largest motor use [–], 1 (white line) is the limit",
 }
 
 
 def write_design_figure(path: Path, target: DesignTarget, design: Design, requirement: Requirement) -> None:
-    """Contours of the objective, and bars of torque, speed and power, as a PNG file."""
+    """The objective as colours, and bars of torque, speed and power, as a PNG file."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 5.6), layout="constrained")
@@ -47,12 +47,12 @@ def draw_objective(axis: "Axes", target: DesignTarget, design: Design) -> None:
     from matplotlib.patches import Rectangle
 
     radii, trails, values = design.grid
-    worst = _WORST_SHOWN * design.value if target.objective == "torque" else np.inf
+    worst = np.inf if target.objective == "isotropy" else _WORST_SHOWN * design.value
     shown = np.minimum(values, worst)
-    picture = axis.contourf(1e3 * radii, 1e3 * trails, shown, levels=_LEVELS, cmap="cividis")
+    picture = axis.pcolormesh(1e3 * radii, 1e3 * trails, shown, shading="gouraud", cmap="cividis", rasterized=True)
     clipped = f", cut off at {worst:.2g}" if (values > worst).any() else ""
     axis.figure.colorbar(picture, ax=axis, label=_TITLES[target.objective] + clipped, format="%.3g")
-    if target.objective == "torque" and shown.min() < 1.0 < shown.max():
+    if target.objective == "use" and shown.min() < 1.0 < shown.max():
         axis.contour(1e3 * radii, 1e3 * trails, shown, levels=[1.0], colors="white", linewidths=1.5)
     (r0, r1), (d0, d1) = (tuple(1e3 * x for x in bounds) for bounds in (target.radius, target.trail))
     axis.add_patch(Rectangle((r0, d0), r1 - r0, d1 - d0, fill=False, edgecolor="black", linewidth=1.2, label="bounds"))

@@ -84,7 +84,7 @@ def test_the_command_leaves_all_or_nothing(tmp_path):
     assert f"Wheels of {1e3 * radius:.1f} mm radius instead of 25.0 mm" in words
     with pytest.raises(ValueError, match="is not empty"):
         design(settings, tmp_path / "out", False, told.append)
-    impossible = read_design("indoor", changes={**CHANGES, "trail": [0.08, 0.1]})
+    impossible = settings.model_copy(update={"trail": (0.08, 0.1)})
     with pytest.raises(ValueError, match="could touch"):
         design(impossible, tmp_path / "out", True, told.append)
     assert (tmp_path / "out" / "design.md").is_file()  # what was there before
@@ -130,6 +130,25 @@ def test_wrong_settings_are_refused_by_a_sentence_that_names_them(target, change
         read_design(target, changes=changes)
 
 
-def test_an_unknown_driven_joint_is_refused():
-    with pytest.raises(ConfigurationError, match="unknown joint 'roll_9'"):
-        make_design(read_design("indoor", changes={"actuation": ["roll_1", "roll_2", "roll_9"]}))
+@pytest.mark.parametrize(
+    ("robot", "changes", "words"),
+    [
+        ("nope", {}, "unknown robot 'nope'"),
+        (None, {"actuation": ["roll_1", "roll_2", "roll_9"]}, "unknown joint 'roll_9'"),
+        (None, {"actuation": ["roll_1", "roll_2", "roll_3"]}, "drive both joints of two casters"),
+        (None, {"trail": [0.08, 0.1]}, "could touch"),
+        (None, {"radius": [1e-4, 2e-4]}, "too uneven"),
+    ],
+)
+def test_what_cannot_be_designed_is_refused_when_settings_are_read(robot, changes, words):
+    with pytest.raises(ValueError, match=words):
+        read_design("indoor", robot, changes)
+
+
+def test_the_page_of_least_torque_says_at_what_speed_it_is_bought():
+    bounds = {"radius": [0.02, 0.03], "trail": [0.02, 0.03], "paths": []}
+    report = make_design(read_design("indoor", changes={"objective": "torque", **bounds}))
+    text, fastest = page(report), max(report.after.motors, key=lambda motor: motor.speed)  # all top speeds are alike
+    assert f"{fastest.joint} turns at up to {fastest.speed:.3g} rad/s" in text
+    assert f"{100 * fastest.speed / fastest.has_speed:.0f} % of its top speed" in text
+    assert "at the least radius and at the least trail: beyond it there may be better ones" in text

@@ -1,5 +1,7 @@
 """caster_gym.analysis.design: optima against dense grids, the rule of scaling, room for wheels, targets refused."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,6 +11,7 @@ from caster_gym.analysis.actuation import worst_conditioning
 from caster_gym.analysis.design import (
     DesignTarget,
     Region,
+    check_designable,
     isotropy_interval,
     optimise,
     redesigned,
@@ -16,6 +19,7 @@ from caster_gym.analysis.design import (
 )
 from caster_gym.analysis.envelope import envelope_loads
 from caster_gym.analysis.isotropy import global_isotropies
+from caster_gym.analysis.joint_sets import classify
 from caster_gym.analysis.sizing import motor_uses, require
 from caster_gym.configuration import ConfigurationError, parse
 from tests.random_robots import random_robot
@@ -24,12 +28,18 @@ ROBOT = load_robot("chung2008")
 LIMITS = {"speed": 1.0, "yaw_rate": 1.5, "acceleration": 0.8, "yaw_acceleration": 3.0, "accelerating_up_to": 0.7}
 BOUNDS = {"radius": (0.015, 0.05), "trail": (0.01, 0.05)}
 EVEN = DesignTarget(**LIMITS, **BOUNDS, objective="isotropy")
-STRONG = DesignTarget(**LIMITS, **BOUNDS, objective="torque")
+STRONG = DesignTarget(**LIMITS, **BOUNDS, objective="use")
+LIGHT = DesignTarget(**LIMITS, **BOUNDS, objective="torque")
 
 
 @pytest.fixture(scope="module")
 def even():
     return optimise(ROBOT, EVEN)
+
+
+@pytest.fixture(scope="module")
+def light():
+    return optimise(ROBOT, LIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +89,45 @@ def test_no_design_of_a_grid_needs_less_of_the_motors(strong):
     assert min(values) >= design.value * (1.0 - 2e-3)
     assert design.value == pytest.approx(min(values), rel=3e-2)  # steps of the grid: 3.5 mm of radius
     assert design.value < design.own[2]
+
+
+def test_no_design_of_a_grid_needs_less_torque(light):
+    """Every design of a grid, by torque over the file's. The corner is the optimum; the search stops 1e-5 beside it."""
+    sizes = np.array([[motor.max_torque] for caster in ROBOT.casters for motor in (caster.roll, caster.steer)])
+    values = []
+    for radius, trail in zip(*allowed(7), strict=True):
+        loads = envelope_loads(light.motions, redesigned(ROBOT, radius, trail), LIGHT)
+        values.append((LIGHT.margin * np.maximum(loads.along, loads.against) / sizes).max())
+    assert light.value == pytest.approx(min(values), rel=1e-4)
+    assert light.value < light.own[2]
+
+
+def test_least_torque_runs_to_the_smallest_wheels_and_trails_and_pays_in_speed(light, strong):
+    """Torques are forces times radius or trail; the rolling motors turn faster in inverse proportion to the radius."""
+    assert light.bounds == ("the least radius", "the least trail")
+    assert (light.radius, light.trail) == pytest.approx((0.015, 0.01), rel=1e-3)  # bounds are met to 1e-3 of the region
+    nearby = {words: value for words, _, _, value in light.nearby}
+    assert nearby["radius / 1.1"] < light.value < nearby["radius × 1.1"]
+    fast, slow = (require(one.robot, LIGHT, one.motions) for one in (light, strong[0]))
+    assert fast.motors[0].joint == "roll_1"
+    assert fast.motors[0].speed * light.radius == pytest.approx(slow.motors[0].speed * strong[0].radius, rel=1e-2)
+    assert fast.motors[0].speed > slow.motors[0].speed
+    assert fast.use > slow.use
+    assert max(m.torque / m.has_torque for m in fast.motors) == pytest.approx(light.value, rel=6e-3)  # as for use
+
+
+def test_the_least_use_keeps_away_from_wheels_that_turn_too_fast():
+    slow = [
+        caster.model_copy(
+            update={kind: getattr(caster, kind).model_copy(update={"max_speed": 50.0}) for kind in ("roll", "steer")}
+        )
+        for caster in ROBOT.casters
+    ]
+    robot = ROBOT.model_copy(update={"casters": tuple(slow)})
+    bounds = {"radius": (0.02, 0.04), "trail": (0.02, 0.03)}
+    strong = optimise(robot, DesignTarget(**LIMITS, **bounds, objective="use"))
+    assert np.isinf(strong.own[2])  # 1 m/s over 25 mm is 40 rad/s, with the margin of 1.3 52 of 50
+    assert strong.radius > 0.026  # with which the margin's 1.3 m/s are 50 rad/s
 
 
 def test_the_design_is_what_is_sized_afterwards(strong):
@@ -156,6 +205,17 @@ def test_two_casters_with_all_joints_are_never_singular_within_the_room():
     assert worst_conditioning(beyond)[0] < 1e-6
 
 
+def test_within_the_room_the_driven_joints_alone_decide_whether_a_design_is_singular():
+    """(S8) with (L6): never singular if both joints of two casters are driven, for whatever radius and trail."""
+    radius, trail = Region.of(ROBOT, EVEN).design(np.random.default_rng(1).random((5, 2)))
+    designs = [redesigned(ROBOT, r, d) for r, d in zip(radius, trail, strict=True)]
+    for count in (3, 4, 5, 6):
+        for joints in combinations(ROBOT.joints, count):
+            paired = sum({f"roll_{i}", f"steer_{i}"} <= set(joints) for i in (1, 2, 3))
+            for design in designs:
+                assert (classify(design, joints).singular == "never") == (paired >= 2), joints
+
+
 def test_every_place_of_the_region_is_a_design_within_bounds_and_room():
     region = Region.of(ROBOT, EVEN)
     places = np.random.default_rng(0).random((1000, 2))
@@ -184,12 +244,30 @@ def test_casters_that_differ_are_refused():
 
 
 def test_motors_that_are_too_slow_for_every_design_are_refused():
-    target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "torque", "speed": 20.0})
+    target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "use", "speed": 20.0})
     with pytest.raises(ValueError, match="no design within the bounds reaches the target"):
         optimise(ROBOT, target)
 
 
-def test_singular_driven_joints_are_refused():
-    target = DesignTarget(**LIMITS, **BOUNDS, actuation=("roll_1", "roll_2", "roll_3"))
-    with pytest.raises(ValueError, match="cannot push itself in every direction"):
+@pytest.mark.parametrize("joints", [("roll_1", "roll_2", "roll_3"), ("roll_1", "steer_1", "roll_2", "steer_3")])
+def test_singular_driven_joints_are_refused(joints):
+    target = DesignTarget(**LIMITS, **BOUNDS, actuation=joints)
+    with pytest.raises(ValueError, match=r"cannot push itself in every direction .* drive both joints of two casters"):
         optimise(ROBOT, target)
+
+
+def test_bounds_within_which_motors_push_too_unevenly_are_refused_as_such():
+    target = DesignTarget(**{**LIMITS, **BOUNDS, "radius": (1e-4, 2e-4)})
+    with pytest.raises(ValueError, match=r"with radius 0\.141 mm, trail .* times as strongly in one direction"):
+        check_designable(ROBOT, target)
+
+
+def test_bounds_of_which_a_part_is_sound_are_searched():
+    region = check_designable(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "radius": (1e-4, 0.05)}))
+    assert region.radius == (1e-4, 0.05)
+
+
+def test_a_path_that_cannot_be_timed_is_refused_before_the_search():
+    target = DesignTarget(**LIMITS, **BOUNDS, paths=[{"shape": "circle", "duration": 1e-4}])
+    with pytest.raises(ValueError, match="a path needs at least 10"):
+        check_designable(ROBOT, target)

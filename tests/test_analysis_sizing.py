@@ -9,6 +9,7 @@ from caster_gym.analysis.envelope import Loads, envelope_loads, sampled_motions
 from caster_gym.analysis.sizing import (
     driven_motors,
     harder_motions,
+    motor_shares,
     motor_uses,
     require,
     sized,
@@ -35,6 +36,13 @@ def test_the_use_of_a_motor_by_hand():
     assert np.isinf(motor_uses(loads, ROBOT, 2.0)).all()
     braking = loads._replace(along=np.zeros((6, 1)))
     assert motor_uses(braking, ROBOT, 1.0)[0, 0] == pytest.approx(0.04 / 0.2)
+
+
+def test_the_share_of_a_motor_by_hand():
+    """(S9): whatever its speed, 0.06 N m are three tenths of 0.2 N m, and 1.5 times that with a margin of 1.5."""
+    loads = Loads(np.full((6, 1), 0.05), np.full((6, 1), 0.06), np.full((6, 1), 500.0))
+    assert_allclose(motor_shares(loads, ROBOT, 1.0)[:, 0], [0.3, 0.6] * 3, rtol=1e-12)  # round-off
+    assert_allclose(motor_shares(loads, ROBOT, 1.5)[:, 0], [0.45, 0.9] * 3, rtol=1e-12)
 
 
 def test_the_smallest_motor_for_one_load_turns_twice_as_fast_without_load():

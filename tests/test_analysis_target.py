@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.analysis.target import Payload, Target, check_actuation, driven_as, loaded
+from caster_gym.analysis.target import Payload, Target, check_actuation, check_conditioning, driven_as, loaded
 from caster_gym.configuration import ConfigurationError, parse
 from tests.random_robots import random_motion, random_robot
 
@@ -61,3 +61,28 @@ def test_driven_joints_that_are_singular_somewhere_are_refused():
     with pytest.raises(ValueError, match=r"three joints or more of robot 'chung2008', got roll_1, steer_1"):
         check_actuation(robot.with_actuation(["roll_1", "steer_1"]))
     check_actuation(robot)
+
+
+def test_trails_with_which_two_wheels_can_meet_are_refused_for_their_length():
+    """E10: the circles of the wheels of casters 1 and 3 meet where their trails are more than half of 0.1732 m."""
+    original = load_robot("chung2008")
+    apart = abs(complex(original.casters[0].x - original.casters[2].x, original.casters[0].y - original.casters[2].y))
+    for trail, meets in ((0.499 * apart, False), (0.501 * apart, True)):
+        casters = tuple(caster.model_copy(update={"trail": trail}) for caster in original.casters)
+        robot = original.model_copy(update={"casters": casters})
+        driven = robot.with_actuation(["roll_1", "steer_1", "roll_3", "steer_3"])
+        if meets:
+            with pytest.raises(ValueError, match="choose shorter trails"):
+                check_actuation(driven)
+        else:
+            check_actuation(driven)
+
+
+def test_motors_that_push_unevenly_are_refused_for_that_and_not_as_singular():
+    original = load_robot("chung2008")
+    casters = tuple(caster.model_copy(update={"radius": 1e-4}) for caster in original.casters)
+    robot = original.model_copy(update={"casters": casters})
+    check_actuation(robot)
+    with pytest.raises(ValueError, match=r"radius 0\.1 mm, trail 25 mm.*bring radius and trail nearer to each other"):
+        check_conditioning(robot)
+    check_conditioning(original)

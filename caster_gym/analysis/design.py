@@ -15,17 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, PositiveFloat
 
+from caster_gym.analysis.actuation import SINGULAR, worst_conditioning
 from caster_gym.analysis.envelope import Motions, envelope_loads, joined, path_loads, sampled_motions
 from caster_gym.analysis.isotropy import global_isotropies
-from caster_gym.analysis.sizing import driven_motors, harder_motions, motor_uses, trajectories_of
-from caster_gym.analysis.target import Target, check_actuation, driven_as, loaded
+from caster_gym.analysis.sizing import driven_motors, harder_motions, motor_shares, motor_uses, trajectories_of
+from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
-Objective: TypeAlias = Literal["isotropy", "torque"]
+Objective: TypeAlias = Literal["isotropy", "torque", "use"]
 
-GRID = {"isotropy": 33, "torque": 17}  # designs along each side of the grid that the search starts from
+GRID = {"isotropy": 33, "torque": 17, "use": 17}  # designs along each side of the grid that the search starts from
 NEARBY = 1.1  # [-] factor by which radius and trail are changed to see how flat the optimum is
 _INTERVALS = {2: 5.0, 3: 10.0, 4: 15.0}  # [°] of the steering angles that isotropy is averaged over, by casters
 _COARSE_INTERVAL = 30.0  # [°] with more casters, whose combinations grow as a power
@@ -34,6 +35,7 @@ _EXCHANGES = 6  # how often motions are added that are harder for the best desig
 _EXACT_ENOUGH = 5e-3  # [-] by which a harder motion may exceed the samples
 _LONGEST_SEARCH = 150  # designs in one local search
 _AT_BOUND = 1e-3  # [-] of the region's width
+_TYPICAL = ((0.5, 0.5), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0))  # places where designs are tried beforehand
 
 
 def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
@@ -46,9 +48,14 @@ Bounds: TypeAlias = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidato
 
 
 class DesignTarget(Target):
-    """A target, what is to be best, and between which bounds."""
+    """A target, what is to be best, and between which bounds.
 
-    objective: Objective = "isotropy"  # greatest global isotropy, or least torque as a share of what the motors have
+    isotropy   greatest global isotropy
+    torque     least of the largest motor torque, as a share of what the file's motor has at standstill (S9)
+    use        least of the largest use: torque as a share of what the file's motor has left at its speed (S5)
+    """
+
+    objective: Objective = "isotropy"
     radius: Bounds  # [m]
     trail: Bounds  # [m]
 
@@ -106,7 +113,7 @@ class Design:
     robot: Robot  # with the best radius and trail, the joints driven that the target names
     radius: float  # [m]
     trail: float  # [m]
-    value: float  # [-] of the objective: isotropy is to be great, use small
+    value: float  # [-] of the objective: isotropy is to be great, torque and use small
     own: tuple[float, float, float]  # radius [m], trail [m] and value of the robot as it was
     bounds: tuple[str, ...]  # in words, those on which it lies
     nearby: tuple[tuple[str, float, float, float], ...]  # what was changed, radius [m], trail [m], value
@@ -156,20 +163,37 @@ def wheel_room(robot: Robot) -> float:
     return float(max((0.5 * between.min()) ** 2 - aside**2, 0.0) ** 0.5)
 
 
+def check_designable(robot: Robot, target: DesignTarget) -> Region:
+    """The region of the designs of a robot, if there is anything to be found in it.
+
+    Raises ValueError for casters that differ, for bounds within which all wheels could touch, for driven joints that
+    are singular at some steering angles, for motors that push too unevenly as the robot is or in all designs, and for
+    paths that cannot be timed.
+    """
+    radius_and_trail(robot)
+    trajectories_of(target)
+    able = driven_as(robot, target)
+    region = Region.of(able, target)
+    designs = [redesigned(able, *map(float, region.design(np.array(place)))) for place in _TYPICAL]
+    check_actuation(designs[0])  # it is the same for all designs of the region, see (S8)
+    check_conditioning(next((one for one in designs if worst_conditioning(one)[0] >= SINGULAR), designs[0]))
+    check_actuation(able)
+    check_conditioning(able)
+    return region
+
+
 def optimise(robot: Robot, target: DesignTarget, report: Callable[[float], None] = lambda share: None) -> Design:
     """The best radius and trail: a grid of designs, then Nelder and Mead's search from its best local optima.
 
-    report is told the share of the work that is done. For torque, motions that are harder than the samples for the
-    design found and for those nearby are added and the search goes on, until there are none.
-    Raises ValueError for a target that no design within the bounds can meet, for driven joints that are singular at
-    some steering angles, and for casters that differ.
+    report is told the share of the work that is done. For torque and use, motions that are harder than the samples for
+    the design found and for those nearby are added and the search goes on, until there are none.
+    Raises ValueError as `check_designable` does, and for a target that no design within the bounds can meet.
     """
     from scipy.optimize import minimize
 
     own = radius_and_trail(robot)
     able = driven_as(robot, target)
-    region = Region.of(able, target)
-    check_actuation(redesigned(able, target.radius[0], target.trail[0]))
+    region = check_designable(able, target)
     search = _Search(able, target, region)
     search.learn(*own)
     count = GRID[target.objective]
@@ -249,13 +273,14 @@ class _Search:
         self.sign = -1.0 if target.objective == "isotropy" else 1.0
 
     def value(self, radius: float, trail: float) -> float:
-        """The objective of a design: isotropy, or the greatest use of a motor. [-]"""
+        """The objective of a design: isotropy, or the greatest torque or use of a motor. [-]"""
         if self.target.objective == "isotropy":
             return float(self._isotropies(np.array([radius]), np.array([trail]))[0])
         full = loaded(redesigned(self.robot, radius, trail), self.target)
         parts = [envelope_loads(self.motions, full, self.target)]
         parts += [path_loads(self.paths, full)] if self.paths else []
-        return max(float(motor_uses(part, full, self.target.margin).max()) for part in parts)
+        measure = motor_uses if self.target.objective == "use" else motor_shares
+        return max(float(measure(part, full, self.target.margin).max()) for part in parts)
 
     def costs(self, places: Array) -> Array:
         """What is to be least, at places (K, 2) of the unit square."""

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.analysis.frames import motion_in_body, rate_in_body
 from caster_gym.analysis.target import Target
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
@@ -121,11 +122,9 @@ def path_loads(trajectories: Sequence[Trajectory], robot: Robot) -> Loads:
         samples = np.stack([trajectory.samples for trajectory in group])
         psi = trailing_directions(samples, robot)
         psi, samples = psi.reshape(-1, psi.shape[-1]), samples.reshape(-1, samples.shape[-1])
+        v, rate = (_columns(part) for part in motion_in_body(samples))
         back = samples[:, 2] - 1j * samples[:, 3]
-        velocity, acceleration = (back * (samples[:, i] + 1j * samples[:, i + 1]) for i in (4, 7))
-        v = (velocity.real, velocity.imag, samples[:, 6])
         f = tuple((one.real, one.imag) for one in (psi * back[:, None]).T)
-        rate = _rate_in_body((acceleration.real, acceleration.imag, samples[:, 9]), v)
         torques = _motor_torques(inverse_dynamics(v, f, rate, parameters), f, robot, parameters)
         parts.append(_loads(torques, np.zeros_like(torques), _speeds(v, f, robot, parameters)))
     return together(parts)
@@ -173,7 +172,8 @@ def placed(
 
 def force_per_acceleration(v: Vector, f: tuple[Direction, ...], held: Vector, parameters: RobotParameters) -> Forces:
     """The generalised force of the inverse dynamics as an affine function of the accelerations over ground."""
-    steady = inverse_dynamics(v, f, _rate_in_body(held, v), parameters)
+    rate = rate_in_body(np.stack(held, axis=-1), np.stack(v, axis=-1))
+    steady = inverse_dynamics(v, f, _columns(rate), parameters)
     xx, xy, xz, yy, yz, zz = inertia(f, parameters)
     return Forces(steady, (xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
@@ -201,9 +201,9 @@ def least_possible_share(motions: Motions, robot: Robot, target: Target) -> floa
     return worst
 
 
-def _rate_in_body(acceleration: Vector, v: Vector) -> Vector:
-    """Rate of the components of the twist in B, from accelerations over ground in B."""
-    return acceleration[0] + v[2] * v[1], acceleration[1] - v[2] * v[0], acceleration[2]
+def _columns(vectors: Array) -> Vector:
+    """The components of vectors (S, 3)."""
+    return vectors[:, 0], vectors[:, 1], vectors[:, 2]
 
 
 def _driven(robot: Robot) -> list[int]:

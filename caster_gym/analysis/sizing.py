@@ -19,7 +19,7 @@ from caster_gym.analysis.envelope import (
     sampled_motions,
     together,
 )
-from caster_gym.analysis.target import Target, check_actuation, driven_as, loaded
+from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Motor, Robot
@@ -95,13 +95,22 @@ def motor_uses(loads: Loads, robot: Robot, margin: float) -> Array:
     return uses
 
 
+def motor_shares(loads: Loads, robot: Robot, margin: float) -> Array:
+    """Torque (J, S) of each driven motor with a margin, as a share of its greatest, whatever its speed. (S9)"""
+    sizes = np.array([motor.max_torque for motor in driven_motors(robot)])[:, None]
+    shares: Array = margin * np.maximum(loads.along, loads.against) / sizes
+    return shares
+
+
 def require(robot: Robot, target: Target, motions: Motions | None = None) -> Requirement:
     """What the target asks of the robot's motors: the worst of its envelope, searched, and of its paths.
 
-    motions: the samples to start from. Raises ValueError for driven joints that are singular at some steering angles.
+    motions: the samples to start from. Raises ValueError for driven joints that are singular at some steering angles,
+    and for those whose conditioning is too bad for torques to be exact.
     """
     able = driven_as(robot, target)
     check_actuation(able)
+    check_conditioning(able)
     full = loaded(able, target)
     samples = sampled_motions(robot.caster_count) if motions is None else motions
     hardest = joined(samples, harder_motions(samples, full, target))
@@ -130,9 +139,8 @@ def require(robot: Robot, target: Target, motions: Motions | None = None) -> Req
                 has_speed=motor.max_speed,
             )
         )
-    sizes = np.array([motor.max_torque for motor in motors])
-    share = np.maximum(envelope.along, envelope.against).max(axis=1) / sizes
-    return Requirement(tuple(rows), float(share.max()), least_possible_share(hardest, full, target))
+    share = float(motor_shares(envelope, full, 1.0).max())
+    return Requirement(tuple(rows), share, least_possible_share(hardest, full, target))
 
 
 def harder_motions(motions: Motions, robot: Robot, target: Target) -> Motions:

@@ -2,9 +2,11 @@
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.analysis.actuation import DEGREES_OF_FREEDOM, SINGULAR, worst_conditioning
+from caster_gym.analysis.joint_sets import classify
 from caster_gym.configuration import Frozen
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.robot import Robot
@@ -63,15 +65,41 @@ def loaded(robot: Robot, target: Target) -> Robot:
 
 
 def check_actuation(robot: Robot) -> None:
-    """Refuse driven joints that cannot push the robot in every direction at all steering angles: no motor would do."""
+    """Refuse driven joints that cannot push the robot in every direction at all steering angles: no motor would do.
+
+    Decided exactly, by the lines of action (docs/analysis.md, L).
+    """
     names = ", ".join(robot.driven)
     if len(robot.driven) < DEGREES_OF_FREEDOM:
         raise ValueError(
             f"a platform has three degrees of freedom: drive three joints or more of robot {robot.name!r}, got {names}"
         )
-    value, _ = worst_conditioning(robot)
+    found = classify(robot, robot.driven)
+    if found.steering is None:
+        return
+    angles = ", ".join(f"{np.degrees(angle):.1f}°" for angle in found.steering)
+    paired = sum({f"roll_{i}", f"steer_{i}"} <= set(robot.driven) for i in range(1, robot.caster_count + 1))
+    remedy = "choose shorter trails" if paired > 1 else "drive both joints of two casters"
+    raise ValueError(
+        f"robot {robot.name!r} driven by {names} cannot push itself in every direction at the steering angles "
+        f"({angles}), so no motors are strong enough; {remedy}"
+    )
+
+
+def check_conditioning(robot: Robot) -> None:
+    """Refuse driven motors that push so unevenly that the damping of their least effort would falsify torques."""
+    value, steering = worst_conditioning(robot)
     if value < SINGULAR:
+        sizes = ", ".join(
+            f"{name} {1e3 * min(lengths):.3g} mm" if min(lengths) == max(lengths) else f"{name}s of the file"
+            for name, lengths in (
+                ("radius", [caster.radius for caster in robot.casters]),
+                ("trail", [caster.trail for caster in robot.casters]),
+            )
+        )
+        angles = ", ".join(f"{np.degrees(angle):.1f}°" for angle in steering)
         raise ValueError(
-            f"robot {robot.name!r} driven by {names} cannot push itself in every direction at all steering angles "
-            f"(its conditioning falls to {value:.2g}), so no motors are strong enough; drive both joints of two casters"
+            f"with {sizes}, the motors of robot {robot.name!r} push {1.0 / value:.0f} times as strongly in one "
+            f"direction as in another at the steering angles ({angles}); more than {1.0 / SINGULAR:.0f} times is too "
+            "uneven for their torques to be found: bring radius and trail nearer to each other"
         )

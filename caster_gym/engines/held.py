@@ -13,7 +13,7 @@ from caster_gym.engines.numba_compiler import compiled
 
 
 @structref.register
-class HeldType(types.StructRef):  # type: ignore[misc]  # Numba has no types
+class HeldType(types.StructRef):
     """What compiled code knows of a `Held`."""
 
 

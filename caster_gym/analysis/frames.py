@@ -1,0 +1,29 @@
+"""Twists, accelerations and forces of the platform (…, 3) in B and in W: two components in the plane, one about ẑ.
+
+A heading is the complex number e^{iβ}, as points of the plane are in `caster_gym.paths`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.paths.trajectory import Array
+
+
+def turned(vector: Array, by: complex | NDArray[np.complex128]) -> Array:
+    """Vectors (..., 3) turned in the plane by unit numbers (...): by a heading from B to W, by its conjugate back."""
+    plane = (vector[..., 0] + 1j * vector[..., 1]) * by
+    return np.stack((plane.real, plane.imag, np.broadcast_to(vector[..., 2], plane.shape)), axis=-1)
+
+
+def rate_in_body(acceleration: Array, twist: Array) -> Array:
+    """Derivatives (..., 3) of the components of a twist in B, from accelerations over ground; all in B."""
+    across = np.stack((twist[..., 1], -twist[..., 0], np.zeros_like(twist[..., 2])), axis=-1)  # −ẑ × v
+    rate: Array = acceleration + twist[..., 2:] * across
+    return rate
+
+
+def motion_in_body(samples: Array) -> tuple[Array, Array]:
+    """Twists in B and the derivatives of their components, (..., 3) each, of a trajectory's samples (..., 10)."""
+    back = samples[..., 2] - 1j * samples[..., 3]
+    twist = turned(samples[..., 4:7], back)
+    return twist, rate_in_body(turned(samples[..., 7:10], back), twist)
