@@ -1,113 +1,219 @@
-"""The same robot in MuJoCo, `caster_gym.export.mjcf`: a peer to check against. Run this file for a table of both."""
+"""Our motions beside MuJoCo's, somebody else's code: python -m scripts.mujoco_peer --out docs/truth
+
+The same torques drive the same robots here and, with ever smaller time steps, in MuJoCo. The command writes a page, a
+table and a figure.
+"""
 
 import argparse
-from itertools import pairwise
-from typing import NamedTuple
+import csv
+import platform
+import shlex
+import sys
+import textwrap
+from collections import Counter
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from tqdm import tqdm
 
-from caster_gym import Model, Robot, load_robot
-from caster_gym.export.mjcf import mjcf
+from caster_gym import Robot, load_robot
+from caster_gym.papers.drawing import COLOURS, new_figure
+from scripts.mujoco_robot import (
+    DURATION,
+    OUR_STEP,
+    STRONG,
+    Drive,
+    driven,
+    joint_indices,
+    path_length,
+    placed,
+    slip,
+    strong_drives,
+    without_dry_friction,
+)
 
-PLANAR = ("x", "y", "yaw")  # joints of the platform besides z
-
-
-class Motion(NamedTuple):
-    """Where the platform went."""
-
-    time: NDArray[np.float64]  # (T,) [s]
-    pose: NDArray[np.float64]  # (T, 3) x, y [m], β [rad] in the world
-
-
-def joint_indices(robot: Robot, model: mujoco.MjModel) -> tuple[list[int], list[int]]:
-    """Where the platform's x, y, yaw and the joints of `robot.joints` stand in MuJoCo's qpos and qvel.
-
-    All joints have one degree of freedom, so the same index holds in both.
-    """
-    index = {model.joint(i).name: int(model.jnt_dofadr[i]) for i in range(model.njnt)}
-    return [index[name] for name in PLANAR], [index[name] for name in robot.joints]
-
-
-def simulate(robot: Robot, state: ArrayLike, torque: ArrayLike, timestep: float, duration: float) -> Motion:
-    """The motion under constant joint torques (2 N) from a state (6 + N) as in `Model.simulate`. SI units.
-
-    All joints must be driven, and the torques within what the motors have.
-    """
-    start = np.asarray(state, dtype=np.float64)
-    beta, steering = start[2], start[6:]
-    model = mujoco.MjModel.from_xml_string(mjcf(robot, timestep))
-    data = mujoco.MjData(model)
-    platform, joints = joint_indices(robot, model)
-    _, rolling, turning = Model(robot).rates(steering, start[3:6])
-    c, s = np.cos(beta), np.sin(beta)
-    data.qpos[platform] = start[:3]
-    data.qpos[joints[1::2]] = steering
-    data.qvel[platform] = c * start[3] - s * start[4], s * start[3] + c * start[4], start[5]
-    data.qvel[joints] = np.stack((rolling, turning), axis=-1).ravel()
-    data.ctrl[:] = motor_torques(robot, torque)
-    steps = round(duration / timestep)
-    pose = np.empty((steps + 1, 3))
-    pose[0] = start[:3]
-    for step in range(1, steps + 1):
-        mujoco.mj_step(model, data)
-        pose[step] = data.qpos[platform]
-    return Motion(timestep * np.arange(steps + 1), pose)
+ROBOTS = ("chung2008", "xr4000", "tidybot2")
+STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)  # [s] MuJoCo's
+DRAWS = 6
 
 
-def motor_torques(robot: Robot, torque: ArrayLike) -> NDArray[np.float64]:
-    """Torques of all motors that give torques at the joints (2 N). [N m]"""
-    at_joints = np.asarray(torque, dtype=np.float64).reshape(robot.caster_count, 2)
-    casters = zip(robot.casters, at_joints, strict=True)
-    return np.concatenate([np.linalg.solve(np.transpose(caster.gear), pair) for caster, pair in casters])
+class Comparison(NamedTuple):
+    """One drive of one robot: ours, and where MuJoCo ends with each of its time steps."""
+
+    robot: str
+    draw: int
+    path: float  # [m] way of C
+    slip: float  # [-] of MuJoCo's wheels at its coarsest step
+    from_exact: NDArray[np.float64]  # (steps,) [m] distance of the ends
+    from_incomplete: NDArray[np.float64]  # (steps,) [m] the same, from the model without (D1)
+    limit: float  # [m] from ours to the end that MuJoCo's two finest steps extrapolate to
 
 
-def path_length(pose: NDArray[np.float64]) -> float:
-    """Length of the way of C. [m]"""
-    return float(np.hypot(*np.diff(pose[:, :2], axis=0).T).sum())
+def compare(robot: Robot, drive: Drive, timesteps: tuple[float, ...] = STEPS) -> Comparison:
+    """Drive a robot, here and in MuJoCo."""
+    draw, state, torque = drive
+    ours, incomplete = driven(robot, [drive], OUR_STEP)[:, 0], driven(robot, [drive], OUR_STEP, "chung2008")[:, 0]
+    ends = np.array([end(robot, state, torque, step) for step in timesteps])
+    return Comparison(
+        robot.name,
+        draw,
+        path_length(ours),
+        slip(robot, state, torque, timesteps[0], DURATION),
+        distance(ends, ours[-1, :2]),
+        distance(ends, incomplete[-1, :2]),
+        float(distance(2.0 * ends[-1] - ends[-2], ours[-1, :2])),
+    )
 
 
-def without_dry_friction(robot: Robot) -> Robot:
-    """The robot without Coulomb friction: MuJoCo has it with its jump at rest, caster_gym with a smooth passage."""
-    casters = tuple(
-        caster.model_copy(
-            update={
-                "roll": caster.roll.model_copy(update={"coulomb": 0.0}),
-                "steer": caster.steer.model_copy(update={"coulomb": 0.0}),
-            }
+def end(robot: Robot, state: NDArray[np.float64], torque: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
+    """Where MuJoCo has C at the end of a drive: x, y [m]."""
+    model, data = placed(robot, state, torque, timestep)
+    mujoco.mj_step(model, data, round(DURATION / timestep))
+    (x, y, _), _ = joint_indices(robot, model)
+    return np.array(data.qpos[[x, y]])
+
+
+def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances (...) between points (..., 2). [m]"""
+    return np.asarray(np.hypot(*np.moveaxis(a - b, -1, 0)))
+
+
+def write_table(file: Path, comparisons: list[Comparison]) -> None:
+    """A line for each robot, draw and time step."""
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(["robot", "draw", "path_m", "mujoco_step_s", "from_exact_m", "from_without_D1_m"])
+        for one in comparisons:
+            for step, exact, incomplete in zip(STEPS, one.from_exact, one.from_incomplete, strict=True):
+                table.writerow([one.robot, one.draw, f"{one.path:.6g}", step, f"{exact:.6g}", f"{incomplete:.6g}"])
+
+
+def draw_convergence(file: Path, comparisons: list[Comparison]) -> None:
+    """Distance of the ends over MuJoCo's step, a panel for each robot."""
+    names = list(dict.fromkeys(one.robot for one in comparisons))
+    figure = new_figure(1, len(names), (3.4, 3.6), sharey=True)
+    steps = 1e3 * np.array(STEPS)
+    sides = (
+        ("from_incomplete", COLOURS[3], "s", "from the model without (D1)"),
+        ("from_exact", COLOURS[0], "o", "from the exact model"),
+    )
+    for axis, name in zip(figure.axes, names, strict=True):
+        mine = [one for one in comparisons if one.robot == name]
+        for field, colour, marker, label in sides:
+            errors = 1e3 * np.array([getattr(one, field) for one in mine])
+            axis.loglog(steps, errors.T, color=colour, alpha=0.25, linewidth=0.9)
+            axis.loglog(steps, np.median(errors, axis=0), color=colour, marker=marker, markersize=4, label=label)
+        middle = 1e3 * np.median([one.from_exact for one in mine], axis=0)
+        axis.loglog(steps, 0.6 * middle[-1] * steps / steps[-1], ":", color="black", linewidth=1.2, label="∝ step")
+        axis.set_title(name)
+        axis.set_xlabel("time step of MuJoCo [ms]")
+        axis.set_xticks(steps, [f"{step:g}" for step in steps])
+        axis.minorticks_off()
+    figure.axes[0].set_ylabel(f"distance of the ends after {DURATION:g} s [mm]")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    figure.savefig(file, dpi=150)
+
+
+def page(comparisons: list[Comparison], folder: str, command: str) -> str:
+    """The comparison as Markdown; pictures and tables lie in a folder beside it."""
+    coarse, fine = 1e3 * STEPS[0], 1e3 * STEPS[-1]
+    heads = (
+        "robot",
+        "way of C [m]",
+        f"slip at {coarse:g} ms",
+        f"off the exact model at {coarse:g} ms [mm]",
+        f"at {fine:g} ms [mm]",
+        "extrapolated to no step [mm]",
+        "a half step leaves",
+        f"off the model without (D1) at {fine:g} ms [mm]",
+    )
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for name in dict.fromkeys(one.robot for one in comparisons):
+        mine = [one for one in comparisons if one.robot == name]
+        exact = 1e3 * np.array([one.from_exact for one in mine])
+        cells = (
+            name,
+            spread([one.path for one in mine]),
+            f"{100.0 * float(np.median([one.slip for one in mine])):.2f} %",
+            spread(exact[:, 0]),
+            spread(exact[:, -1]),
+            spread([1e3 * one.limit for one in mine]),
+            f"{np.median(exact[:, -1] / exact[:, -2]):.3f}",
+            spread([1e3 * one.from_incomplete[-1] for one in mine]),
         )
-        for caster in robot.casters
-    )
-    return robot.model_copy(update={"casters": casters})
+        lines.append(f"| {' | '.join(cells)} |")
+    closer = sum(one.from_exact[-1] < 0.5 * one.from_incomplete[-1] for one in comparisons)
+    draws = max(Counter(one.robot for one in comparisons).values())
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "mujoco", "numpy"))
+    parts = [
+        "# Truth by somebody else's code",
+        paragraph(
+            """MuJoCo is given the same robots as rigid bodies: a platform that slides and turns in the plane, steering
+            links, and wheels that are spheres on a plane, held from sliding by the friction of its contact solver
+            ([mjcf.py](../caster_gym/export/mjcf.py)). It knows joints, masses and contacts, but none of the equations
+            in [equations.md](equations.md). Its contacts are soft over a few time steps, so its wheels creep a little,
+            and less with every smaller step."""
+        ),
+        paragraph(
+            f"""Each robot is driven {draws} times from rest for {DURATION:g} s, with wheels askew and constant torques,
+            drawn so that each joint pushes the floor with up to {100.0 * STRONG:.0f} % of the weight on its wheel and
+            no motor outruns its top speed. Compared is where the platform ends. Dry friction in the joints is left out,
+            since MuJoCo's jumps at rest where ours passes smoothly."""
+        ),
+        "\n".join(lines),
+        f"Medians over the drives, least and greatest in brackets; [all of them]({folder}/convergence.csv).",
+        paragraph(
+            f"""As its step goes to zero, MuJoCo ends where the exact model ends: each half step leaves half of the
+            distance, and what is left after extrapolating to no step is its error of second order. From the model
+            without (D1), the term that chung2008 lacks, it stays away by as much as the two models differ. In {closer}
+            of {len(comparisons)} drives MuJoCo's finest step ends at least twice as close to the exact model as to the
+            one without (D1)."""
+        ),
+        f"![Distance of MuJoCo's end from both models' ends, over MuJoCo's time step]({folder}/convergence.png)",
+        paragraph(
+            """*Thin lines are single drives, thick ones their medians. Blue falls in proportion to MuJoCo's step, as
+            the dotted line does: the exact model is its limit. Orange levels off: without (D1) the equations describe
+            another robot.*"""
+        ),
+        f"- Command: `{command}`\n- Ours: RK4 at {1e3 * OUR_STEP:g} ms\n"
+        f"- Versions: Python {platform.python_version()}, {libraries}\n",
+    ]
+    return "\n\n".join(parts)
 
 
-def main() -> None:
-    """Where MuJoCo ends after the same torques, seen from the equations with and without (D1); no dry friction."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--robot", default="chung2008", help="name of a robot or path of its file")
-    parser.add_argument("--duration", type=float, default=4.0, help="[s]")
-    parser.add_argument("--share", type=float, default=0.1, help="torques drawn up to this share of the greatest")
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    robot = without_dry_friction(load_robot(arguments.robot))
-    rng = np.random.default_rng(arguments.seed)
-    limits = np.array([[c.roll.max_torque, c.steer.max_torque] for c in robot.casters]).ravel()
-    torque = arguments.share * limits * rng.uniform(-1.0, 1.0, limits.shape)
-    state = np.concatenate((np.zeros(6), rng.uniform(-np.pi, np.pi, robot.caster_count)))
-    fine = 1e-3
-    steps = round(arguments.duration / fine)
-    exact, printed = (
-        Model(robot, dynamics).simulate(state, torque, fine, steps)[:, :3] for dynamics in ("exact", "chung2008")
+def paragraph(text: str) -> str:
+    """The text in lines of 120 characters."""
+    return textwrap.fill(" ".join(text.split()), 120, break_long_words=False, break_on_hyphens=False)
+
+
+def spread(values: Any) -> str:
+    """Median, least and greatest."""
+    low, middle, high = (
+        np.format_float_positional(v, 2, fractional=False, trim="-") for v in np.quantile(values, (0.0, 0.5, 1.0))
     )
-    print(f"{robot.name}: {path_length(exact):.2f} m of path in {arguments.duration:g} s")
-    print(f"{'MuJoCo step':>12} {'from exact':>12} {'without (D1)':>12}")
-    errors = []
-    for timestep in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
-        end = simulate(robot, state, torque, timestep, arguments.duration).pose[-1]
-        errors.append([1e3 * float(np.hypot(*(end - model[-1])[:2])) for model in (exact, printed)])
-        print(f"{1e3 * timestep:>9.3f} ms {errors[-1][0]:>9.2f} mm {errors[-1][1]:>9.2f} mm")
-    print("ratios of the errors:", ", ".join(f"{a[0] / b[0]:.2f}" for a, b in pairwise(errors)))
+    return f"{middle} ({low} – {high})"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Compare, and write the page DIR.md with what belongs to it in DIR."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS), help="names or files")
+    parser.add_argument("--draws", type=int, default=DRAWS, help="drives of each robot")
+    parser.add_argument("--out", type=Path, default=Path("docs/truth"), metavar="DIR")
+    chosen = parser.parse_args(arguments)
+    robots = [without_dry_friction(load_robot(name)) for name in chosen.robots]
+    pairs = [(robot, drive) for robot in robots for drive in strong_drives(robot, chosen.draws)]
+    comparisons = [compare(robot, drive) for robot, drive in tqdm(pairs, file=sys.stderr)]
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    write_table(chosen.out / "convergence.csv", comparisons)
+    draw_convergence(chosen.out / "convergence.png", comparisons)
+    command = shlex.join(["python", "-m", "scripts.mujoco_peer", *(sys.argv[1:] if arguments is None else arguments)])
+    chosen.out.with_suffix(".md").write_text(page(comparisons, chosen.out.name, command), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import pytest
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.export.mjcf import mjcf
-from scripts.mujoco_peer import joint_indices, path_length, simulate, without_dry_friction
+from scripts.mujoco_peer import STEPS, compare, draw_convergence, page, write_table
+from scripts.mujoco_robot import joint_indices, path_length, simulate, slip, strong_drives, without_dry_friction
 from tests.random_robots import random_robot
 
 STEP = 2e-3  # [s] of the equations
@@ -82,3 +83,29 @@ def test_joints_stand_where_their_names_say():
 def test_mass_of_the_peer_is_that_of_the_robot():
     model = mujoco.MjModel.from_xml_string(mjcf(CHUNG, STEP))
     assert model.body_mass.sum() == pytest.approx(5.0 + 3 * (0.5 + 0.1), rel=1e-12)  # rounding of a sum
+
+
+def test_strong_drives_stay_within_the_motors():
+    """The ninth draw of chung2008 would outrun them, and is left out."""
+    drives = strong_drives(CHUNG, 10)
+    assert [drive.draw for drive in drives] == [*range(9), 10]
+    limits = np.array([[caster.roll.max_torque, caster.steer.max_torque] for caster in CHUNG.casters]).ravel()
+    assert all((np.abs(drive.torque) < limits).all() for drive in drives)
+
+
+def test_slip_falls_with_the_step():
+    """It is of the contact's softness, which MuJoCo ties to its step: half a step, half the slip."""
+    coarse, fine = (slip(CHUNG, START, TORQUE, step, 1.0) for step in (1e-3, 5e-4))
+    assert coarse / fine == pytest.approx(2.0, rel=0.1)  # second order in the step
+
+
+def test_page_tells_what_was_compared(tmp_path):
+    """Smoke of page, table and figure; the limit of MuJoCo is ours."""
+    one = compare(CHUNG, strong_drives(CHUNG, 1)[0])
+    assert one.limit < 0.1 * one.from_exact[-1]
+    write_table(tmp_path / "convergence.csv", [one])
+    draw_convergence(tmp_path / "convergence.png", [one])
+    assert len((tmp_path / "convergence.csv").read_text().splitlines()) == 1 + len(STEPS)
+    text = page([one], "truth", "python -m scripts.mujoco_peer")
+    assert "| chung2008 | 1.4 " in text
+    assert "In 1 of 1 drives" in text
