@@ -1,14 +1,14 @@
 """Does an incomplete model degrade control? chung2008 says it may; here computed torque tries."""
 
-from itertools import product
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from caster_gym.papers.page import Check, Difference, Picture, Section, Table
+from caster_gym.papers.page import Check, Difference, Section, Table
 
 from .computed_torque import gains
+from .model_figures import picture
 from .model_trials import (
+    BARE,
+    EXACT,
     FINE_PERIOD,
     FREQUENCIES,
     HELD,
@@ -16,9 +16,12 @@ from .model_trials import (
     MODELS,
     PATHS,
     PERIOD,
+    PRINTED,
     RESERVE,
     RUNGS,
+    SOFT,
     STARTS,
+    STIFF,
     Array,
     Study,
     exponents,
@@ -26,15 +29,8 @@ from .model_trials import (
 )
 from .track_metrics import SETTLING
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 WORSE = 2.0  # times the error count as degraded
 EQUAL = 1.1  # times the error count as the same
-
-_EXACT, _PRINTED, _BARE = range(3)  # of MODELS
-_SOFT, _STIFF = range(2)  # of FREQUENCIES
 
 
 def section() -> Section:
@@ -45,22 +41,22 @@ def section() -> Section:
         _text(studies),
         _checks(studies),
         _tables(studies),
-        (Picture("incomplete_models", _caption(), _figure(studies)),),
+        (picture(studies),),
         (_difference(studies[0]),),
     )
 
 
 def _text(studies: list[Study]) -> str:
     own, other = studies
-    turned = own.heading[:, _SOFT, 0, -1]
-    effort = max(float(np.abs(s.effort[1:] / s.effort[_EXACT] - 1.0).max()) for s in studies)
+    turned = own.heading[:, SOFT, 0, -1]
+    effort = max(float(np.abs(s.effort[1:] / s.effort[EXACT] - 1.0).max()) for s in studies)
     distance = [s.apart[1:] / s.predicted[1:] for s in studies]
-    soft, stiff = (np.stack([exponents(s.apart[1:, q], s.speeds) for s in studies]) for q in (_SOFT, _STIFF))
-    hold = [exponents(s.position[_EXACT], s.speeds) for s in studies]
-    beside = own.position[_EXACT] / own.apart[_PRINTED]
-    ratio = gains(FREQUENCIES[_STIFF], PERIOD).stiffness / gains(FREQUENCIES[_SOFT], PERIOD).stiffness
-    stiffer = np.log(own.apart[1:, _SOFT] / own.apart[1:, _STIFF]) / np.log(ratio)
-    least = min(float((s.position[_BARE] / s.position[_EXACT]).min()) for s in studies)
+    soft, stiff = (np.stack([exponents(s.apart[1:, q], s.speeds) for s in studies]) for q in (SOFT, STIFF))
+    hold = [exponents(s.position[EXACT], s.speeds) for s in studies]
+    beside = own.position[EXACT] / own.apart[PRINTED]
+    ratio = gains(FREQUENCIES[STIFF], PERIOD).stiffness / gains(FREQUENCIES[SOFT], PERIOD).stiffness
+    stiffer = np.log(own.apart[1:, SOFT] / own.apart[1:, STIFF]) / np.log(ratio)
+    least = min(float((s.position[BARE] / s.position[EXACT]).min()) for s in studies)
     return f"""
 The paper compares the forces of the model with and without wheels (Figs. 8 and 9) and concludes that the incomplete
 model "may deteriorate the required control performance of some dynamic model-based control algorithms"; it never closes
@@ -81,8 +77,8 @@ alone does is the distance between two robots whose controllers differ in nothin
 {_span(stiff)} of the speed under stiff feedback, and {_span(soft)} under soft feedback, which is too slow for the
 fastest motions; on {own.robot} it falls with the power {_span(stiffer)} of k_p. Integrated along the reference, without
 simulating the robot, the law predicts this distance on {own.robot} within {np.abs(distance[0] - 1.0).max():.1%} in
-every case, and on {other.robot} without D1 within {np.abs(distance[1][_PRINTED - 1] - 1.0).max():.1%}. On {other.robot}
-without wheels it is {_span(distance[1][_BARE - 1])} times the prediction: M⁻¹M̂ has eigenvalues of
+every case, and on {other.robot} without D1 within {np.abs(distance[1][PRINTED - 1] - 1.0).max():.1%}. On {other.robot}
+without wheels it is {_span(distance[1][BARE - 1])} times the prediction: M⁻¹M̂ has eigenvalues of
 {other.grip[0]:.2f} … {other.grip[1]:.2f} ({own.grip[0]:.2f} … {own.grip[1]:.2f} on {own.robot}), the feedback is weaker
 by as much, and so every other error grows as well; that of compensating dry friction with held torques is not small.
 
@@ -93,9 +89,9 @@ lack of (D1) does at the lowest speed, and {_span(beside[..., -1])} at the highe
 
 **The answer.** In proportion the claim holds: without wheels the position RMSE is at least {least:.1f} times that of
 the exact model, whatever the robot, path, speed and feedback. In size it depends on speed and feedback. On the paper's
-own motion, at {own.speeds[0, 0]:.2f} m/s, the error goes {_change(own, _BARE, 0)}; at {own.speeds[0, -1]:.2f} m/s
-{_change(own, _BARE, -1)}, and the RMSE of the heading from {1e3 * turned[_EXACT]:.2g} to {1e3 * turned[_BARE]:.2g} mrad
-at {FREQUENCIES[_SOFT]:g} rad/s. The effort is that of the exact model within {effort:.0%}. The wheels have to be in
+own motion, at {own.speeds[0, 0]:.2f} m/s, the error goes {_change(own, BARE, 0)}; at {own.speeds[0, -1]:.2f} m/s
+{_change(own, BARE, -1)}, and the RMSE of the heading from {1e3 * turned[EXACT]:.2g} to {1e3 * turned[BARE]:.2g} mrad
+at {FREQUENCIES[SOFT]:g} rad/s. The effort is that of the exact model within {effort:.0%}. The wheels have to be in
 the model where the feedback must stay soft (noise, delay, contact) and the robot is fast.
 """
 
@@ -106,9 +102,9 @@ def _checks(studies: list[Study]) -> tuple[Check, ...]:
         Check(
             f"performance of computed torque without wheels, {s.robot}, all paths, speeds and bandwidths",
             "“incomplete dynamic model neglecting wheel dynamics may deteriorate the required control performance”",
-            f"position RMSE {_span(s.position[_BARE] / s.position[_EXACT], 1)} times that of the exact model; on the "
-            f"circle at {s.speeds[0, -1]:.2f} m/s {_change(s, _BARE, -1)}",
-            bool((s.position[_BARE] > WORSE * s.position[_EXACT]).all()),
+            f"position RMSE {_span(s.position[BARE] / s.position[EXACT], 1)} times that of the exact model; on the "
+            f"circle at {s.speeds[0, -1]:.2f} m/s {_change(s, BARE, -1)}",
+            bool((s.position[BARE] > WORSE * s.position[EXACT]).all()),
             "the size depends on the feedback: error = M̂⁻¹Δ/k_p",
         )
         for s in studies
@@ -117,21 +113,21 @@ def _checks(studies: list[Study]) -> tuple[Check, ...]:
         Check(
             f"the same on the paper's own circle, {own.durations[0, 0]:g} s",
             "“significant differences at F_x, F_y, and M_Z … may deteriorate the required control performance”",
-            _change(own, _BARE, 0),
-            bool((own.position[_BARE, :, 0, 0] > WORSE * own.position[_EXACT, :, 0, 0]).all()),
+            _change(own, BARE, 0),
+            bool((own.position[BARE, :, 0, 0] > WORSE * own.position[EXACT, :, 0, 0]).all()),
             f"true in proportion; at {own.speeds[0, 0]:.2f} m/s the loss is below "
-            f"{np.ceil(1e4 * own.position[_BARE, _SOFT, 0, 0]) / 10:g} mm even with soft feedback",
+            f"{np.ceil(1e4 * own.position[BARE, SOFT, 0, 0]) / 10:g} mm even with soft feedback",
         )
     )
     checks += [
         Check(
             f"performance with the model as printed, without (D1), {s.robot}",
             "“accurate dynamic model taking into account the wheel dynamics”",
-            f"position RMSE {_span(s.position[_PRINTED] / s.position[_EXACT], 1)} times that of the exact model; "
-            f"on the circle at {s.speeds[0, -1]:.2f} m/s {_change(s, _PRINTED, -1)}",
-            bool((s.position[_PRINTED] < EQUAL * s.position[_EXACT]).all()),
+            f"position RMSE {_span(s.position[PRINTED] / s.position[EXACT], 1)} times that of the exact model; "
+            f"on the circle at {s.speeds[0, -1]:.2f} m/s {_change(s, PRINTED, -1)}",
+            bool((s.position[PRINTED] < EQUAL * s.position[EXACT]).all()),
             f"E3: (D1) is missing; what that does is "
-            f"{_span(s.apart[_PRINTED] / s.apart[_BARE])} of what leaving the wheels out does",
+            f"{_span(s.apart[PRINTED] / s.apart[BARE])} of what leaving the wheels out does",
         )
         for s in studies
     ]
@@ -142,9 +138,9 @@ def _difference(own: Study) -> Difference:
     return Difference(
         "E3",
         "(43), (47): the model as a controller's knowledge",
-        "“P*_φφφ becomes a zero array”: without (D1)",
+        "(49) as printed: without (D1)",
         "(D1) is needed for tracking as well",
-        f"computed torque on {own.robot}, circle at {own.speeds[0, -1]:.2f} m/s: {_change(own, _PRINTED, -1)}",
+        f"computed torque on {own.robot}, circle at {own.speeds[0, -1]:.2f} m/s: {_change(own, PRINTED, -1)}",
     )
 
 
@@ -228,10 +224,10 @@ def _tables(studies: list[Study]) -> tuple[Table, ...]:
 
 
 def _law_row(s: Study, p: int, q: int, m: int) -> list[str | float]:
-    grown = s.position if m == _EXACT else s.apart
+    grown = s.position if m == EXACT else s.apart
     power = float(exponents(grown[m, q, p], s.speeds[p]))
     head: list[str | float] = [s.robot, list(PATHS)[p], FREQUENCIES[q], MODELS[m], power]
-    if m == _EXACT:
+    if m == EXACT:
         return [*head, "", ""]
     ratio = s.predicted[m, q, p] / s.apart[m, q, p]
     return [*head, _span(ratio, 3), float(s.balanced[m, q, p, -1] / s.apart[m, q, p, -1])]
@@ -239,7 +235,7 @@ def _law_row(s: Study, p: int, q: int, m: int) -> list[str | float]:
 
 def _coarse(s: Study) -> Array:
     """RMSE (frequencies, HELD) of the exact model on the fastest rung at the usual period. [m]"""
-    return s.position[_EXACT, :, [list(PATHS).index(path) for path in HELD], -1].T
+    return s.position[EXACT, :, [list(PATHS).index(path) for path in HELD], -1].T
 
 
 def _order(s: Study) -> Array:
@@ -250,60 +246,10 @@ def _order(s: Study) -> Array:
     return order
 
 
-def _caption() -> str:
-    return (
-        "Position RMSE of computed torque over the mean speed of the motion, by what the controller knows of the "
-        f"robot. Solid: feedback of {FREQUENCIES[_SOFT]:g} rad/s, dashed: of {FREQUENCIES[_STIFF]:g} rad/s. Crosses: "
-        "what the law predicts of the lack in the model alone. Incomplete models lose with v², the exact one, by "
-        "holding its torques, with v³ where there is no dry friction; feedback lowers all of them."
-    )
-
-
-def _figure(studies: list[Study]) -> "Figure":
-    from caster_gym.papers.drawing import new_figure
-
-    figure = new_figure(len(studies), len(PATHS), sharex="all", sharey="row")
-    for panel, (s, p) in zip(figure.axes, product(studies, range(len(PATHS))), strict=True):
-        _draw(panel, s, p)
-        panel.label_outer()
-    for panel in figure.axes[:: len(PATHS)]:
-        panel.set_ylabel("position RMSE [mm]")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    return figure
-
-
-def _draw(panel: "Axes", s: Study, p: int) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
-
-    from caster_gym.papers.drawing import COLOURS
-
-    colours = (COLOURS[0], COLOURS[2], COLOURS[3])
-    v = s.speeds[p]
-    for (m, model), (q, f) in product(enumerate(MODELS), enumerate(FREQUENCIES)):
-        label = f"{model}, {f:g} rad/s"
-        panel.plot(v, 1e3 * s.position[m, q, p], "-" if q == _SOFT else "--", color=colours[m], label=label)
-    for q in range(len(FREQUENCIES)):
-        label = "" if q else "law"
-        panel.plot(v, 1e3 * s.predicted[_PRINTED, q, p], "x", color="black", markersize=5, zorder=3, label=label)
-        panel.plot(v, 1e3 * s.predicted[_BARE, q, p], "x", color="black", markersize=5, zorder=3)
-    guide, lowest = np.array([1.0, 2.0]), 1e3 * s.position[_EXACT, _STIFF].min()
-    for power, sign in ((2, "v²"), (3, "v³")):
-        panel.plot(0.4 * guide, lowest * guide**power, color="0.5", linewidth=1.0)
-        panel.annotate(sign, (0.82, lowest * guide[1] ** power), color="0.35", fontsize=8, va="center")
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.xaxis.set_major_formatter(ScalarFormatter())
-    panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_xlabel("mean speed [m/s]")
-    panel.set_title(f"{s.robot}, {list(PATHS)[p]}")
-
-
 def _change(s: Study, model: int, rung: int) -> str:
     """Position RMSE on the circle, from the exact model's to another's, at each natural frequency."""
     parts = [
-        f"{_length(s.position[_EXACT, q, 0, rung])} → {_length(s.position[model, q, 0, rung])} at {f:g} rad/s"
+        f"{_length(s.position[EXACT, q, 0, rung])} → {_length(s.position[model, q, 0, rung])} at {f:g} rad/s"
         for q, f in enumerate(FREQUENCIES)
     ]
     return ", ".join(parts)

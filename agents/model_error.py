@@ -18,6 +18,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.analysis.frames import motion_in_body
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.feasibility import trailing_directions
 from caster_gym.paths.specification import AnyPath
@@ -60,14 +61,10 @@ def trailing_steering(samples: Array, robot: Robot) -> Array:
 
 
 def _lack(samples: Array, steering: Array, robot: Robot, known: KnownModel) -> Lack:
-    c, s = samples[:, 2], samples[:, 3]
-    velocity, acceleration = ((c - 1j * s) * (samples[:, i] + 1j * samples[:, i + 1]) for i in (4, 7))
-    omega, alpha = samples[:, 6], samples[:, 9]
-    turning = acceleration - 1j * omega * velocity  # derivative of the components of the velocity in B
-    twist = np.stack([velocity.real, velocity.imag, omega], axis=1)
-    rate = np.stack([turning.real, turning.imag, alpha], axis=1)
+    twist, rate = motion_in_body(samples)
     exact, guess = Model(robot), known_model(robot, known)
     delta = exact.inverse_dynamics(steering, twist, rate) - guess.inverse_dynamics(steering, twist, rate)
+    c, s = samples[:, 2], samples[:, 3]
     one, nothing = np.ones_like(c), np.zeros_like(c)
     to_world = np.array([[c, -s, nothing], [s, c, nothing], [nothing, nothing, one]]).transpose(2, 0, 1)
     inertia = exact.inertia(steering)

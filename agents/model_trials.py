@@ -27,7 +27,9 @@ from .track_metrics import SETTLING, measure
 Array: TypeAlias = NDArray[np.float64]
 
 MODELS: tuple[KnownModel, ...] = get_args(KnownModel)  # the exact one first
+EXACT, PRINTED, BARE = range(3)  # of MODELS
 FREQUENCIES = (3.0, 30.0)  # [rad/s] of the feedback: soft and stiff
+SOFT, STIFF = range(2)  # of FREQUENCIES
 PERIOD = 0.02  # [s] between torques
 FINE_PERIOD = 0.01  # [s] the same, to tell what holding torques costs
 PATHS: dict[str, AnyPath] = {

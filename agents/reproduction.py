@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from caster_gym.configuration import did_you_mean
-from caster_gym.papers.page import Section, differences_page, write_page
+from caster_gym.papers.page import Section, differences_page, printed_checks, unexplained, write_page
 
 from .provenance import write_provenance
 from .run_folder import MARK, check_free, replace_file, staged
@@ -88,9 +88,8 @@ def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int]
         write_provenance(fresh, paper=name)
     replace_file(out / f"{name}.md", page)
     replace_file(out / "differences.md", differences_page(out, tuple(PAPERS)))
-    checks = [check for section in sections for check in section.checks]
-    unexplained = tuple(check.what for check in checks if not check.agrees and not check.remark)
-    return Verdict(sum(check.agrees for check in checks), len(checks), unexplained)
+    printed = printed_checks(sections)
+    return Verdict(sum(check.agrees for check in printed), len(printed), unexplained(sections))
 
 
 def _check_out(name: str, out: Path, overwrite: bool) -> None:

@@ -1,4 +1,4 @@
-"""(N10): changing the independent joints."""
+"""(N9): changing the independent joints."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_there_is_a_complement_for_every_three_joints():
 
 
 def test_the_set_in_use_stays_below_the_limit_and_is_kept_as_long():
-    """(N10)."""
+    """(N9)."""
     chosen, numbers = choose_along(turning_casters(400), SETS, LIMIT)
     used = numbers[np.arange(len(chosen)), chosen]
     assert used.max() < LIMIT
@@ -53,7 +53,7 @@ def test_each_twist_rate_is_that_of_the_operational_space():
 
 @pytest.mark.parametrize("caster_count", [2, 3, 4])
 def test_singular_steering_is_singular(caster_count):
-    """(N3): the rows of the three joints, from the operational-space model, have no inverse there."""
+    """(N2): the rows of the three joints, from the operational-space model, have no inverse there."""
     robot = random_robot(52, caster_count)
     found = 0
     for one in all_complements(robot)[::3]:
@@ -78,7 +78,7 @@ def test_none_where_turning_one_caster_makes_nothing_singular():
 
 
 def test_changing_joints_leave_the_motion_unchanged():
-    """(N10), (N8): under the same torques as the operational-space model."""
+    """(N9), (N7): under the same torques as the operational-space model."""
     model, dt, steps = Model(CHUNG), 0.01, 150
     state = np.array([0.0, 0.0, 0.0, 0.2, 0.1, 0.3, 2.5, 2.2, 1.8])  # casters that flip
     torque = np.tile([-0.004, 0.0, 0.004, 0.0, 0.003, 0.001], (steps, 1))
@@ -86,7 +86,7 @@ def test_changing_joints_leave_the_motion_unchanged():
     apart = np.abs(walk.states - model.simulate(state, torque, dt, steps)).max()
     fine = simulate(SETS, state, np.repeat(torque, 2, axis=0), 0.5 * dt, LIMIT)
     apart_fine = np.abs(fine.states - model.simulate(state, torque[0], 0.5 * dt, 2 * steps)).max()
-    # both are of fourth order, in other coordinates: half a step, a sixteenth of the difference, while casters flip
+    # the steps are of fifth order here and of fourth there: half a step, a sixteenth of it, while casters flip
     assert apart < 1e-3
     assert apart_fine < apart / 10.0
     changes = np.count_nonzero(np.diff(walk.chosen))

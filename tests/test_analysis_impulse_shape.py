@@ -8,13 +8,13 @@ from caster_gym import Model, Robot, load_robot
 from caster_gym.analysis.impulse_shape import (
     anisotropy,
     caster_weights,
+    contact_mobility,
     effective_mass,
     ellipse_gap,
     elongation,
     extremes,
     impulse,
     loss_share,
-    mobility,
 )
 from tests.kane import Kane
 from tests.random_robots import CASTER_COUNTS, random_motion, random_robot
@@ -77,7 +77,9 @@ def test_mobility_at_the_centre_is_the_inverse_of_the_schur_complement():
     m = model.inertia(random_motion(6, robot, 20)[0])
     schur = m[:, :2, :2] - m[:, :2, 2:] * m[:, 2:, :2] / m[:, 2:, 2:]
     # entries of the product are of order 1, rounding times the conditioning of M
-    assert_allclose(mobility(model, random_motion(6, robot, 20)[0]) @ schur, np.tile(np.eye(2), (20, 1, 1)), atol=1e-11)
+    assert_allclose(
+        contact_mobility(model, random_motion(6, robot, 20)[0]) @ schur, np.tile(np.eye(2), (20, 1, 1)), atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("point", [(0.0, 0.0), POINT])
@@ -136,7 +138,7 @@ def test_direct_part_and_coupling_make_the_elongation(caster_count):
     model = Model(robot)
     steering = random_motion(8, robot, 50)[0]
     direct, coupling = anisotropy(model, steering)
-    mean = 0.5 * np.trace(np.linalg.inv(mobility(model, steering)), axis1=-2, axis2=-1)
+    mean = 0.5 * np.trace(np.linalg.inv(contact_mobility(model, steering)), axis1=-2, axis2=-1)
     assert_allclose(elongation(model, steering), (direct + coupling) / mean, atol=1e-11)  # rounding of two inverses
 
 
@@ -214,9 +216,9 @@ def test_impulse_grows_with_speed_and_restitution():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m: mobility(m, [0, 0, 0], (0.1, 0.2, 0.3)), r"point must be two finite coordinates .*0\.3"),
-        (lambda m: mobility(m, [0, 0, 0], (0.1, np.nan)), "point must be two finite coordinates .*nan"),
-        (lambda m: mobility(m, [0, 0]), "steering must have a last axis of 3"),
+        (lambda m: contact_mobility(m, [0, 0, 0], (0.1, 0.2, 0.3)), r"point must be two finite coordinates .*0\.3"),
+        (lambda m: contact_mobility(m, [0, 0, 0], (0.1, np.nan)), "point must be two finite coordinates .*nan"),
+        (lambda m: contact_mobility(m, [0, 0]), "steering must have a last axis of 3"),
         (lambda m: effective_mass(m, [0, 0, 0], np.inf), "direction must be a finite angle .*inf"),
         (lambda m: effective_mass(m, [0, 0, 0], [[0.0]]), "direction must be a finite angle in rad or a list"),
         (lambda m: impulse(m, [0, 0, 0], 0.0, 1.2), r"restitution must lie in 0 … 1, got 1\.2"),

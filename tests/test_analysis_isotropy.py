@@ -157,3 +157,7 @@ def test_balanced_casters_are_two_or_more_known_ones_without_offset():
         balanced_isotropy(tidybot, np.zeros(4), (1, 2), 1.0, 1.0)
     with pytest.raises(ValueError, match="top_speed must be positive and finite, got 0"):
         balanced_isotropy(KIM, np.zeros(3), (1, 2), 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"steering must have a last axis of 3, got shape \(2,\)"):
+        balanced_isotropy(KIM, np.zeros(2), (1, 2), 1.0, 1.0)
+    with pytest.raises(ValueError, match="steering must be finite, got nan"):
+        balanced_isotropy(KIM, [0.0, np.nan, 0.0], (1, 2), 1.0, 1.0)

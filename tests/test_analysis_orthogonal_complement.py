@@ -1,4 +1,4 @@
-"""(N1) to (N9): the natural orthogonal complement, against the operational-space model and the laws of mechanics."""
+"""(N1) to (N8): the natural orthogonal complement, against the operational-space model and the laws of mechanics."""
 
 from itertools import combinations
 
@@ -39,7 +39,7 @@ def well_conditioned(robot, seed, count=1, number=100.0):
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: f"{robot.name}-{robot.caster_count}")
 def test_every_three_joints_give_the_dynamics_of_the_operational_space(robot):
-    """(N4), (N5), (N6), (N7), (N8), (N9): friction, gears' rotors and torques at dependent joints included."""
+    """(N3), (N4), (N5), (N6), (N7), (N8): friction, gears' rotors and torques at dependent joints included."""
     steering, twist, torque, _ = random_motion(31, robot, 20)
     expected = Model(robot).forward_dynamics(steering, twist, torque)
     compared = 0
@@ -76,12 +76,12 @@ def test_a_link_with_its_mass_centre_over_the_axle_has_no_such_term():
 
 @pytest.mark.parametrize("caster_count", CASTER_COUNTS)
 def test_each_casters_rates_give_the_same_twist(caster_count):
-    """(N1), (N2), (N4): rates from Kane's equations close every loop, and their independent ones imply them all."""
+    """(N1), (N3): rates from Kane's equations close every loop, and their independent ones imply them all."""
     robot = random_robot(5, caster_count)
     complement, steering, twist, _ = (part if i == 0 else part[0] for i, part in enumerate(well_conditioned(robot, 34)))
     eta, theta, delta = Kane(robot).rates(steering, twist)
     rates = np.stack((eta, theta, delta), -1)
-    twists = np.einsum("nij,nj->ni", complement.forward_jacobians(steering), rates)
+    twists = np.einsum("nij,nj->ni", forward_jacobian(robot, steering), rates)
     assert_allclose(twists, np.tile(twist, (caster_count, 1)), atol=1e-12)  # rounding of rates up to 100 rad/s
     names = [f"{kind}_{i}" for i in range(1, caster_count + 1) for kind in ("yaw", "roll", "steer")]
     named = dict(zip(names, rates.ravel(), strict=True))
@@ -98,17 +98,9 @@ def test_each_casters_rates_give_the_same_twist(caster_count):
     assert_allclose(moving.rates, complement.all_rates(steering, independent), rtol=1e-12)  # the same sums
 
 
-def test_forward_jacobians_are_those_of_the_chains():
-    """(N1) is (J2) in another form."""
-    robot = random_robot(10, 3)
-    steering, *_ = random_motion(42, robot)
-    complement = OrthogonalComplement(robot, ("roll_1", "steer_2", "roll_3"))
-    assert_allclose(complement.forward_jacobians(steering), forward_jacobian(robot, steering), atol=1e-15)  # rounding
-
-
 @pytest.mark.parametrize("caster_count", CASTER_COUNTS)
 def test_loops_are_singular_where_the_rows_of_the_independent_joints_are(caster_count):
-    """(N3): |det J_p| = Π d r · |det g_a|."""
+    """(N2): |det J_p| = Π d r · |det g_a|."""
     robot = random_robot(6, caster_count)
     steering, *_ = random_motion(35, robot, 10)
     product = np.prod([caster.trail * caster.radius for caster in robot.casters])
@@ -120,7 +112,7 @@ def test_loops_are_singular_where_the_rows_of_the_independent_joints_are(caster_
 
 
 def test_the_loops_of_any_robot_are_square():
-    """(N2): as many equations as dependent rates, for every number of casters."""
+    """(N1): as many equations as dependent rates, for every number of casters."""
     for count in CASTER_COUNTS:
         j_p, j_a = OrthogonalComplement(random_robot(7, count), ("roll_1", "steer_1", "roll_2")).loops(
             np.ones((4, count))
@@ -131,7 +123,7 @@ def test_the_loops_of_any_robot_are_square():
 
 @pytest.mark.parametrize("caster_count", CASTER_COUNTS)
 def test_inertia_and_coriolis_matrix_hang_together(caster_count):
-    """(N5), (N6), (N7): dI/dt = C + Cᵀ, so that C does no work of its own; dI/dt by differences along the motion."""
+    """(N4), (N5), (N6): dI/dt = C + Cᵀ, so that C does no work of its own; dI/dt by differences along the motion."""
     robot = random_robot(8, caster_count)
     complement, steering, twist, _ = (
         part if i == 0 else part[0] for i, part in enumerate(well_conditioned(robot, 36, number=50.0))
@@ -146,7 +138,7 @@ def test_inertia_and_coriolis_matrix_hang_together(caster_count):
 
 
 def test_inertia_is_the_kinetic_energy():
-    """(N7): ½ φ̇_aᵀ I φ̇_a = ½ νᵀ M ν."""
+    """(N6): ½ q̇_aᵀ I q̇_a = ½ νᵀ M ν."""
     for robot in ROBOTS:
         complement, steering, twist, _ = well_conditioned(robot, 37, count=5)
         rates = complement.independent_rates(steering, twist)
@@ -156,7 +148,7 @@ def test_inertia_is_the_kinetic_energy():
 
 
 def test_accelerations_are_those_of_the_joints():
-    """(N8): φ̈_a by differences of the joint rates along a simulated motion."""
+    """(N7): q̈_a by differences of the joint rates along a simulated motion."""
     robot = frictionless(random_robot(9, 3))
     complement, steering, twist, torque = (
         part if i == 0 else part[0] for i, part in enumerate(well_conditioned(robot, 38))
@@ -173,7 +165,7 @@ def test_accelerations_are_those_of_the_joints():
 
 
 def test_the_printed_matrix_loses_more_than_vectors_do():
-    """(N8): near the singularity of straight driving, C as a matrix costs the error a further 1/distance."""
+    """(N7): near the singularity of straight driving, C as a matrix costs the error a further 1/distance."""
     steering, twist, torque, _ = random_motion(39, CHUNG, 200)
     steering = 1e-4 * steering
     exact = Model(CHUNG).forward_dynamics(steering, twist, torque)
@@ -189,7 +181,7 @@ def test_the_printed_matrix_loses_more_than_vectors_do():
 
 
 def test_the_papers_own_set_is_singular_when_the_robot_drives_straight():
-    """(N3): wheels 1 and 2 roll on one line along x, while the operational space has nothing to invert."""
+    """(N2): wheels 1 and 2 roll on one line along x, while the operational space has nothing to invert."""
     complement = OrthogonalComplement(CHUNG, PAPER_SET)
     assert complement.condition_number(np.zeros(3)) > 1e15  # infinite but for rounding
     assert complement.condition_number(np.full(3, 0.5 * np.pi)) < 100.0

@@ -153,6 +153,20 @@ def test_lines_of_another_shape_are_refused(lines, length):
         meeting(lines, length)
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ([np.nan, 0.0, 0.1], "lines must be finite, got nan"),
+        ([0.6, 0.8, np.inf], "lines must be finite, got inf"),
+        ([0.0, 0.0, 0.1], "lines must begin with unit vectors, got one of length 0"),
+        ([3.0, 4.0, 0.1], "lines must begin with unit vectors, got one of length 5"),
+    ],
+)
+def test_a_line_that_is_none_is_named(line, message):
+    with pytest.raises(ValueError, match=message):
+        meeting([[1.0, 0.0, 0.0], line, [0.0, 1.0, 0.0]], 0.2)
+
+
 @pytest.mark.parametrize("length", [0.0, -1.0, np.nan])
 def test_a_length_that_is_none_is_refused(length):
     with pytest.raises(ValueError, match="length must be positive and finite"):

@@ -10,6 +10,7 @@ from caster_gym.papers.chung2008.complement import LIMIT, PAPER_SET, section
 from caster_gym.papers.chung2008.complement_checks import printed_loops
 from caster_gym.papers.chung2008.complement_runs import DECADES, DISTANCES, STEP, drive, power
 from caster_gym.papers.notation import CHUNG2008, lengths_of
+from caster_gym.papers.page import unexplained
 
 CHUNG = load_robot("chung2008")
 
@@ -21,8 +22,7 @@ def page():
 
 def test_every_check_agrees_or_names_an_erratum(page):
     assert len(page.checks) == 9
-    for check in page.checks:
-        assert check.agrees or "E3" in check.remark, check
+    assert unexplained([page]) == ()
     assert [check.agrees for check in page.checks].count(False) == 1  # (27) against the printed (47)
 
 
@@ -51,7 +51,8 @@ def test_changing_the_set_keeps_what_the_papers_set_loses(page):
     alone, best, *changed = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
     for single in (alone, best):
         assert single["condition number"] > 1e3
-        assert single["of the place [mm]"] > 1.0
+        place = single["of the place [mm]"]
+        assert place > 1.0 if isinstance(place, float) else "lost after" in place
     for row, limit in zip(changed, (LIMIT, 1000.0), strict=True):
         assert row["condition number"] <= limit
         assert 0 < int(row["changes"]) < 20

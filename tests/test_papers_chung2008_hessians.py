@@ -3,6 +3,7 @@
 import pytest
 
 from caster_gym.papers.chung2008.hessians import section
+from caster_gym.papers.page import unexplained
 
 
 @pytest.fixture(scope="module")
@@ -13,14 +14,14 @@ def page():
 def test_every_statement_agrees_or_names_its_erratum(page):
     disagreeing = {check.what: check.remark for check in page.checks if not check.agrees}
     assert set(disagreeing) == {"(18): ü = G φ̇ + φ̇ᵀ H φ̇", 'A.1: "Position Hessian matrix is symmetric"'}
-    assert all(remark.startswith("E") for remark in disagreeing.values())
+    assert unexplained([page]) == ()
     assert len(page.differences) == 2
 
 
 def test_the_skew_part_over_ground_is_half_the_radius(page):
     """0.0125 m of 0.025 m, for rolling and yaw; (J7) is tested with the Hessian itself."""
     (symmetry,) = [check for check in page.checks if "Position" in check.what]
-    assert "over ground 0.0125 m (r/2) of θ and η, else" in symmetry.ours
+    assert "over ground 0.0125 m (r/2) of θ and η, " in symmetry.ours
 
 
 def test_the_hessian_stands_in_a_table_as_its_closed_form(page):

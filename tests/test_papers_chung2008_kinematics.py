@@ -3,6 +3,7 @@
 import pytest
 
 from caster_gym.papers.chung2008.kinematics import section
+from caster_gym.papers.page import unexplained
 
 
 @pytest.fixture(scope="module")
@@ -12,8 +13,12 @@ def page():
 
 def test_every_statement_agrees_or_names_its_erratum(page):
     disagreeing = {check.what: check.remark for check in page.checks if not check.agrees}
-    assert set(disagreeing) == {"(16): matrix of (η_2, θ_2, φ_2)", "(16) is the inverse of (13)"}
-    assert all(remark.startswith("E2") for remark in disagreeing.values())
+    assert set(disagreeing) == {
+        "introduction, on Campion et al.: motors that three casters need to avoid singularity",
+        "(16): matrix of (η_2, θ_2, φ_2)",
+        "(16) is the inverse of (13)",
+    }
+    assert unexplained([page]) == ()
 
 
 def test_mobility_is_three_as_printed(page):
@@ -31,6 +36,15 @@ def test_all_printed_equations_have_a_verdict(page):
 
 def test_the_difference_is_measured(page):
     """E2: l / d = 0.173 / 0.025 at cos φ₂ = ±1, which random angles nearly reach."""
-    (difference,) = page.differences
+    difference, _ = page.differences
     assert difference.tag == "E2"
     assert "6.92 rad/s" in difference.evidence
+
+
+def test_four_motors_are_enough(page):
+    """E27: against "more than four", from all sets of joints; kim2001 names the same three."""
+    check, difference = page.checks[0], page.differences[1]
+    assert not check.agrees and check.ours.startswith("4: (θ_1, φ_1, θ_2, φ_2), (θ_1, φ_1, θ_3, φ_3), ")
+    assert difference.tag == "E27"
+    assert "of all 63 sets of joints the smallest without singularity have 4" in difference.evidence
+    assert "6 of 6 sets of five have none either" in difference.evidence

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from caster_gym.papers.kim2001.lines import compare_random, compare_singular, section
+from caster_gym.analysis.singular_lines import action_lines, meeting
+from caster_gym.papers.kim2001.lines import compare_random, compare_singular, section, singular_configurations
 
 
 def test_the_geometry_and_the_rank_say_the_same():
@@ -18,7 +19,20 @@ def test_the_geometry_and_the_rank_say_the_same():
 def test_configurations_made_singular_are():
     found = compare_singular(seed=6, robots=50)
     assert found.gap.shape == (50,)
+    assert found.met.all()
     assert found.gap.max() < 1e-12 and found.singular_value.max() < 1e-12  # rounding
+
+
+def test_configurations_made_singular_are_of_three_kinds():
+    """Lines that meet far away, or are parallel, one a caster; and both of one caster with others through its wheel."""
+    made = list(singular_configurations(np.random.default_rng(8), 60))
+    for k, (robot, joints, steering) in enumerate(made):
+        casters = [joint.split("_")[1] for joint in joints]
+        met = meeting(action_lines(robot, steering, joints), 1.0)
+        assert len(joints) >= 3
+        assert len(set(casters)) == len(casters) - (k % 3 == 2)
+        assert met.singular and met.parallel == (k % 3 == 1)
+    assert any(len({joint.split("_")[1] for joint in joints}) < robot.caster_count for robot, joints, _ in made)
 
 
 def test_turning_away_goes_through_all_sizes():

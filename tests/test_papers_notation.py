@@ -122,3 +122,9 @@ def test_robots_of_another_geometry_are_refused():
         (name, value) = next(iter(values.items()))
         with pytest.raises(ValueError, match=f"one radius, one trail and no lateral offset.*{name} {value:g}"):
             lengths_of(changed(1, **values))
+
+
+@pytest.mark.parametrize("letters", ["x_1", "θ1", "θ_", "θ_1 η_2", "roll_1"])
+def test_what_is_no_joint_of_the_papers_is_named(letters):
+    with pytest.raises(ValueError, match=f"a letter θ or φ with a number, such as θ_1, got '{letters.split()[-1]}'"):
+        in_words(letters)

@@ -14,6 +14,8 @@ from caster_gym.papers.page import (
     check_number,
     differences_page,
     markdown_table,
+    printed_checks,
+    unexplained,
     write_page,
 )
 from caster_gym.robot import load_robot
@@ -44,9 +46,13 @@ def section(name="curve", tag="E3"):
     return Section(
         "Forces",
         "What is computed.",
-        checks=(check_number("(1)", "3", 3.0), Check("(2)", "always", "sometimes", False, f"{tag}: not when it rains")),
+        checks=(
+            check_number("(1)", "3", 3.0),
+            Check("(2)", "always", "sometimes", False, f"{tag}: not when it rains"),
+            Check("by hand", "0.5", "0.5", True, own=True),
+        ),
         tables=(Table(name, "How it falls.", ("speed", "error"), [(1.0, 0.12345678), (2.0, "none | at all")]),),
-        pictures=(Picture(name, "It falls.", new_figure()),),
+        pictures=(Picture(name, "Error by speed", "It falls.", new_figure()),),
         differences=(Difference(tag, "(2)", "always", "sometimes", "it rained"),),
     )
 
@@ -54,12 +60,45 @@ def section(name="curve", tag="E3"):
 def test_page_holds_verdicts_tables_and_figures(tmp_path):
     page = write_page("paper", "A paper", "Somebody, 2001.", [section()], tmp_path)
     assert "1 of 2 printed numbers and statements agree" in page
+    assert "Checks of our own stand apart; 1 of 1 hold." in page
+    assert "Checks of our own:\n\n| what | expected | found | verdict | remark |" in page
+    assert page.index("| (2) |") < page.index("Checks of our own:") < page.index("| by hand | 0.5 | 0.5 | pass |")
     assert "| (2) | always | sometimes | **fail** | E3: not when it rains |" in page
     assert "| 1 | 0.1235 |\n| 2 | none \\| at all |" in page
-    assert "![It falls.](paper/curve.png)" in page
+    assert "![Error by speed](paper/curve.png)" in page
+    assert page.count("It falls.") == 1
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "curve.csv").open(encoding="utf-8", newline="") as file:
         assert list(csv.reader(file)) == [["speed", "error"], ["1.0", "0.12345678"], ["2.0", "none | at all"]]
+
+
+def test_the_file_of_checks_tells_which_are_our_own(tmp_path):
+    write_page("paper", "A paper", "", [section()], tmp_path)
+    with (tmp_path / "checks.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["what"], row["own"]) for row in rows] == [("(1)", "False"), ("(2)", "False"), ("by hand", "True")]
+    assert [check.what for check in printed_checks([section()])] == ["(1)", "(2)"]
+
+
+def test_a_page_without_checks_of_our_own_does_not_speak_of_them(tmp_path):
+    plain = section()._replace(checks=(check_number("(1)", "3", 3.0),))
+    assert "our own" not in write_page("paper", "A paper", "", [plain], tmp_path)
+
+
+def failing(remark, own=False):
+    return Section("Forces", "", checks=(Check("it", "1", "2", False, remark, own),))
+
+
+@pytest.mark.parametrize("remark", ["", "an error of the eye", "Exactly half", "E4: another difference", "E33"])
+@pytest.mark.parametrize("own", [False, True])
+def test_a_failed_check_must_name_a_difference_of_its_paper(remark, own):
+    assert unexplained([section(), failing(remark, own)]) == ("it",)
+
+
+@pytest.mark.parametrize("remark", ["E3", "E3: not so", "see E4 and E3"])
+def test_a_failed_check_that_does_so_is_explained(remark):
+    """The difference may stand in another section."""
+    assert unexplained([section(), failing(remark)]) == ()
 
 
 def test_a_long_table_is_a_file_alone(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
+from caster_gym.papers.jacobian_checks import check_matrix, compare
 from caster_gym.papers.notation import CHUNG2008, KIM2001, kim2001_robot, lengths_of
 from caster_gym.papers.printed_jacobians import (
     CHUNG2008_FORWARD,
@@ -14,8 +15,6 @@ from caster_gym.papers.printed_jacobians import (
     KIM2001_GENERAL,
     KIM2001_INVERSE,
     KIM2001_THREE,
-    check_matrix,
-    compare,
 )
 from tests.random_robots import random_robot
 

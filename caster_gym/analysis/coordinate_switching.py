@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from caster_gym.analysis.orthogonal_complement import INDEPENDENT, OrthogonalComplement, finite
+from caster_gym.analysis.checked import finite
+from caster_gym.analysis.frames import turned
+from caster_gym.analysis.orthogonal_complement import INDEPENDENT, OrthogonalComplement
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -43,9 +45,9 @@ def singular_steering(complement: OrthogonalComplement, steering: Array) -> Arra
     for caster in reversed(range(len(steering))):
 
         def determinant(angle: float, caster: int = caster) -> float:
-            turned = np.array(steering)
-            turned[caster] = angle
-            return float(np.linalg.det(complement.loops(turned)[0]))  # (N3)
+            there = np.array(steering)
+            there[caster] = angle
+            return float(np.linalg.det(complement.loops(there)[0]))  # (N2)
 
         angles = steering[caster] + np.linspace(0.0, 2.0 * np.pi, 73)
         values = [determinant(angle) for angle in angles]
@@ -67,7 +69,7 @@ def choose_along(steering: ArrayLike, candidates: Sequence[OrthogonalComplement]
     chosen = np.empty(len(numbers), dtype=np.int64)
     now = int(numbers[0].argmin())
     for step, row in enumerate(numbers):
-        now = now if row[now] <= limit else int(row.argmin())  # (N10)
+        now = now if row[now] <= limit else int(row.argmin())  # (N9)
         chosen[step] = now
     return chosen, numbers
 
@@ -93,7 +95,8 @@ def simulate(
 ) -> Walk:
     """The motion from a state (6 + N,) under torques (steps, 2 N), with the rates of independent joints as the state.
 
-    RK4 with a step of dt [s], the joints being changed between steps. With one candidate they never are.
+    Steps of dt [s] by Dormand and Prince's method of fifth order, the joints being changed between them; with one
+    candidate they never are.
     The walk ends where the numbers cease to be finite or the joints are singular to the last digit.
     Raises ValueError for a dt that cannot follow the casters, and for arrays of the wrong shape or not finite.
     """
@@ -115,13 +118,13 @@ def simulate(
         examined += 1
         if number > limit:
             twist = candidates[now].twist(steering, rates)
-            now = _best(candidates, steering)  # (N10)
+            now = _best(candidates, steering)  # (N9)
             rates = candidates[now].independent_rates(steering, twist)
             number = float(candidates[now].condition_number(steering))
             examined += len(candidates)
         chosen[step], numbers[step] = now, number
         try:
-            full = _rk4(candidates[now], np.concatenate((states[step, :3], rates, steering)), given, dt)
+            full = _stepped(candidates[now], np.concatenate((states[step, :3], rates, steering)), given, dt)
             states[step + 1] = (*full[:3], *candidates[now].twist(full[6:], full[3:6]), *full[6:])
         except ValueError:
             break
@@ -141,18 +144,17 @@ def _check(candidates: Sequence[OrthogonalComplement], limit: float) -> None:
         raise ValueError(f"limit must be 1 or more, as condition numbers are, got {limit:g}")
 
 
-def _rk4(complement: OrthogonalComplement, y: Array, torque: Array, h: float) -> Array:
-    """One step of pose, independent rates and steering angles."""
+def _stepped(complement: OrthogonalComplement, y: Array, torque: Array, h: float) -> Array:
+    """Pose, independent rates and steering angles after one step. Raises ValueError where there is none."""
+    from scipy.integrate import RK45
 
-    def derivative(y: Array) -> Array:
+    def derivative(_: float, y: Array) -> Array:
         motion = complement.motion(y[6:], y[3:6], torque)
-        vx, vy, omega = motion.twist
-        c, s = np.cos(y[2]), np.sin(y[2])
-        pose = (c * vx - s * vy, s * vx + c * vy, omega)
-        return np.array([*pose, *motion.accelerations, *motion.rates[2::3]])
+        return np.concatenate((turned(motion.twist, np.exp(1j * y[2])), motion.accelerations, motion.rates[2::3]))
 
-    a = derivative(y)
-    b = derivative(y + 0.5 * h * a)
-    c = derivative(y + 0.5 * h * b)
-    d = derivative(y + h * c)
-    return np.asarray(y + (h / 6.0) * (a + 2.0 * b + 2.0 * c + d))
+    solver = RK45(derivative, 0.0, y, h, first_step=h, atol=np.inf)  # no error is too great: the step stays
+    with np.errstate(over="ignore", invalid="ignore"):
+        solver.step()
+    if solver.status != "finished":
+        raise ValueError("the motion ceases to be finite within a step")
+    return np.asarray(solver.y)

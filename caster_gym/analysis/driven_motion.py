@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.analysis.checked import finite
+from caster_gym.analysis.frames import motion_in_body, turned
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
@@ -31,8 +33,7 @@ class DrivenMotion:
 
     def in_world(self, force: Array) -> Array:
         """Forces (K + 1, 3) at C with components in W instead of B."""
-        turned = (force[:, 0] + 1j * force[:, 1]) * np.exp(1j * self.pose[:, 2])
-        return np.stack((turned.real, turned.imag, force[:, 2]), axis=-1)
+        return turned(force, np.exp(1j * self.pose[:, 2]))
 
 
 def steady_steering(robot: Robot, twist: ArrayLike) -> Array:
@@ -40,7 +41,7 @@ def steady_steering(robot: Robot, twist: ArrayLike) -> Array:
 
     Raises ValueError where a pivot is slower than its trail times the yaw rate: its caster never comes to rest there.
     """
-    vx, vy, omega = np.moveaxis(_finite("twist", twist, 3), -1, 0)[..., None]
+    vx, vy, omega = np.moveaxis(finite("twist", twist, 3), -1, 0)[..., None]
     x, y, trail = (np.array([getattr(caster, name) for caster in robot.casters]) for name in ("x", "y", "trail"))
     ax, ay = vx - omega * y, vy + omega * x
     speed, needed = np.hypot(ax, ay), trail * np.abs(omega)
@@ -70,7 +71,11 @@ def lead(
 
     if not 0.0 < tolerance < 1.0:
         raise ValueError(f"tolerance must lie between 0 and 1, got {tolerance:g}")
-    time, pose, twist, twist_rate = _platform(trajectory)
+    samples = trajectory.samples
+    time = trajectory.time_step * np.arange(len(samples), dtype=np.float64)
+    heading = np.unwrap(np.angle(samples[:, 2] + 1j * samples[:, 3]))
+    pose = np.column_stack((samples[:, :2], heading))
+    twist, twist_rate = motion_in_body(samples)
     count = robot.caster_count
     if steering is None:
         moving = np.abs(twist).max(axis=1) > _STILL
@@ -78,7 +83,7 @@ def lead(
             raise ValueError(f"path {trajectory.name!r} never moves: give the steering angles of the casters")
         start = steady_steering(robot, twist[moving.argmax()])
     else:
-        start = _finite("steering", steering, count)
+        start = finite("steering", steering, count)
         if start.shape != (count,):
             raise ValueError(f"steering must have shape ({count},), got {start.shape}")
     model, twist_at = Model(robot), CubicHermiteSpline(time, twist, twist_rate)
@@ -121,28 +126,3 @@ def work(motion: DrivenMotion, force: Array) -> Array:
     power = np.einsum("ki,ki->k", force, motion.twist)
     done: Array = CubicSpline(motion.time, power).antiderivative()(motion.time)
     return done
-
-
-def _platform(trajectory: Trajectory) -> tuple[Array, Array, Array, Array]:
-    """Times, poses, twists in B and the derivatives of their components."""
-    samples = trajectory.samples
-    heading = samples[:, 2] + 1j * samples[:, 3]
-    velocity, acceleration = (heading.conj() * (samples[:, i] + 1j * samples[:, i + 1]) for i in (4, 7))
-    omega = samples[:, 6]
-    turning = acceleration - 1j * omega * velocity
-    return (
-        trajectory.time_step * np.arange(len(samples), dtype=np.float64),
-        np.stack((samples[:, 0], samples[:, 1], np.unwrap(np.angle(heading))), axis=-1),
-        np.stack((velocity.real, velocity.imag, omega), axis=-1),
-        np.stack((turning.real, turning.imag, samples[:, 9]), axis=-1),
-    )
-
-
-def _finite(name: str, value: ArrayLike, last: int) -> Array:
-    """The value as an array of finite numbers with the right last axis."""
-    array = np.asarray(value, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != last:
-        raise ValueError(f"{name} must have a last axis of {last}, got shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-    return array

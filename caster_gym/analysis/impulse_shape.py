@@ -6,7 +6,7 @@ effective mass of P in that direction; its curve over all directions tells how t
     steering    angles δ of the casters                                            [rad]    (..., N)
     direction   of the motion, against the body x-axis                             [rad]    () or (K,)
     point       P in B; C by default                                               [m]      (2,)
-    W           mobility of P: its velocity per unit of an impulse at it           [1/kg]   (..., 2, 2)
+    W           contact mobility of P: its velocity per unit of impulse at it      [1/kg]   (..., 2, 2)
     Λ           effective mass of P in a direction                                 [kg]     (...) or (..., K)
     ε           elongation: |ε| is 0 for a circle and nears 1 for a needle; half
                 its argument is the direction of the greatest Λ                    [-]      (...), complex
@@ -45,7 +45,7 @@ class Extremes(NamedTuple):
         return np.asarray(self.greatest / self.least)
 
 
-def mobility(model: Model, steering: ArrayLike, point: ArrayLike = CENTRE) -> Array:
+def contact_mobility(model: Model, steering: ArrayLike, point: ArrayLike = CENTRE) -> Array:
     """W (..., 2, 2) of a point [1/kg], while the wheels roll on without slip."""
     x, y = _point(point)
     rows = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])  # velocity of the point from the twist
@@ -59,7 +59,7 @@ def effective_mass(model: Model, steering: ArrayLike, direction: ArrayLike, poin
     if angle.ndim > 1 or not np.isfinite(angle).all():
         raise ValueError(f"direction must be a finite angle in rad or a list of them, got {direction!r}")
     n = np.stack((np.cos(angle), np.sin(angle)), -1)
-    w = mobility(model, steering, point)
+    w = contact_mobility(model, steering, point)
     quadratic = np.einsum("...ij,ki,kj->...k", w, np.atleast_2d(n), np.atleast_2d(n))
     masses = 1.0 / quadratic  # (U2)
     return np.asarray(masses[..., 0] if angle.ndim == 0 else masses)
@@ -85,7 +85,7 @@ def impulse(
 
 def extremes(model: Model, steering: ArrayLike, point: ArrayLike = CENTRE) -> Extremes:
     """Least and greatest effective mass and their axes, each (...); the axes of a circle mean nothing."""
-    w = mobility(model, steering, point)
+    w = contact_mobility(model, steering, point)
     mean, half = _mean(w), _anisotropy(w)
     size, axis = np.abs(half), 0.5 * np.angle(half)  # (U3)
     turn = 0.5 * np.pi
@@ -94,7 +94,7 @@ def extremes(model: Model, steering: ArrayLike, point: ArrayLike = CENTRE) -> Ex
 
 def elongation(model: Model, steering: ArrayLike, point: ArrayLike = CENTRE) -> ComplexArray:
     """ε (...): |ε| = (ratio − 1)/(ratio + 1), arg ε / 2 is the direction of the greatest effective mass."""
-    w = mobility(model, steering, point)
+    w = contact_mobility(model, steering, point)
     return np.asarray(-_anisotropy(w) / _mean(w))  # (U3)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.analysis.checked import finite
 from caster_gym.analysis.isotropy_grid import mean_isotropy
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import wheel_centre
@@ -85,8 +86,8 @@ def balanced_isotropy(
     """Local index (...) of both joints of these casters (from 1) if all r θ̇_max and d δ̇_max are the same.
 
     Then only the places of the wheels' centres matter, not how the wheels stand. steering (..., N) [rad], top_speed
-    [m/s] in every direction, top_yaw_rate [rad/s]. Raises ValueError for fewer than two casters, for unknown ones and
-    for wheels with a lateral offset.
+    [m/s] in every direction, top_yaw_rate [rad/s]. Raises ValueError for fewer than two casters, for unknown ones,
+    for wheels with a lateral offset, and for steering of the wrong last axis or not finite.
     """
     known = range(1, robot.caster_count + 1)
     if len(set(casters)) < max(2, len(casters)) or any(number not in known for number in casters):
@@ -94,7 +95,7 @@ def balanced_isotropy(
     if any(robot.casters[number - 1].offset != 0.0 for number in casters):
         raise ValueError(f"robot {robot.name!r} has wheels with a lateral offset: their rolling and steering interfere")
     speed, yaw = _positive("top_speed", top_speed), _positive("top_yaw_rate", top_yaw_rate)
-    angles, parameters = np.asarray(steering, dtype=np.float64), robot_parameters(robot)
+    angles, parameters = finite("steering", steering, robot.caster_count), robot_parameters(robot)
     centres = np.array(
         [
             wheel_centre((np.cos(angles[..., i]), np.sin(angles[..., i])), parameters.casters[i])

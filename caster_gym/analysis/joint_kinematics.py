@@ -16,6 +16,7 @@ function raises ValueError if it has another last axis or is not finite.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.analysis.checked import finite
 from caster_gym.mechanics.caster import rate_rows, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import Direction, each
@@ -36,15 +37,15 @@ def inverse_jacobian(robot: Robot, steering: ArrayLike) -> Array:
 
 def forward_jacobian(robot: Robot, steering: ArrayLike) -> Array:
     """G (..., N, 3, 3): the twist from the rates η̇, θ̇, δ̇ of any one caster; det G = d r."""
-    matrices = []
     directions = _directions(robot, steering)
-    for (c, s), caster in zip(directions, robot_parameters(robot).casters, strict=True):
+    matrix = np.zeros((*np.shape(steering), 3, 3))
+    for i, ((c, s), caster) in enumerate(zip(directions, robot_parameters(robot).casters, strict=True)):
         ox, oy = wheel_centre((c, s), caster)
-        zero, one = np.zeros_like(c), np.ones_like(c)
-        vx = (oy, caster.radius * c, -caster.y * one)  # (J2)
-        vy = (-ox, caster.radius * s, caster.x * one)  # (J2)
-        matrices.append(_stack([_stack(row, -1) for row in (vx, vy, (one, zero, -one))], -2))
-    return _stack(matrices, -3)
+        matrix[..., i, 0, ETA], matrix[..., i, 1, ETA] = oy, -ox  # (J2)
+        matrix[..., i, 0, THETA], matrix[..., i, 1, THETA] = caster.radius * c, caster.radius * s  # (J2)
+        matrix[..., i, 0, DELTA], matrix[..., i, 1, DELTA] = -caster.y, caster.x  # (J2)
+    matrix[..., 2, :] = HEADING  # (J2)
+    return matrix
 
 
 def forward_hessian(robot: Robot, steering: ArrayLike) -> Array:
@@ -76,11 +77,7 @@ def inverse_hessian(robot: Robot, steering: ArrayLike) -> Array:
 
 
 def _directions(robot: Robot, steering: ArrayLike) -> tuple[Direction, ...]:
-    angles = np.asarray(steering, dtype=np.float64)
-    if angles.ndim == 0 or angles.shape[-1] != robot.caster_count:
-        raise ValueError(f"steering must have a last axis of {robot.caster_count}, got shape {angles.shape}")
-    if not np.isfinite(angles).all():
-        raise ValueError(f"steering must be finite, got {angles[~np.isfinite(angles)][0]}")
+    angles = finite("steering", steering, robot.caster_count)
     return tuple((np.cos(angles[..., i]), np.sin(angles[..., i])) for i in range(robot.caster_count))
 
 

@@ -1,24 +1,28 @@
 """The natural orthogonal complement: the dynamics in three independent joint rates. docs/analysis.md, section N.
 
-    φ̇     rates (η̇_i, θ̇_i, δ̇_i) of all casters, one caster after the other                 [rad/s]   (…, 3 N)
-    φ̇_a   the three independent ones, in the order of their names; φ̇_p the others, in the order of φ̇
-    K_i    true twist of the platform at C from the rates of caster i                                  (…, 3, 3)
-    J_p    of the closed loops, J_p φ̇_p = J_a φ̇_a                                         (…, 3 N − 3, 3 N − 3)
-    S      φ̇ = S φ̇_a                                                                                 (…, 3 N, 3)
-    T      twists (angular velocity, velocity of the mass centre) of all bodies from φ̇     (…, 6 (2 N + 1), 3 N)
-    G      the same from φ̇_a: G = T S, the natural orthogonal complement                     (…, 6 (2 N + 1), 3)
+    q̇      rates (η̇_i, θ̇_i, δ̇_i) of all casters, one caster after the other                [rad/s]   (…, 3 N)
+    q̇_a    the three independent ones, in the order of their names; q̇_p the others, in the order of q̇
+    K_i    twist of the platform at C from the rates of caster i, section J's forward Jacobian         (…, 3, 3)
+    J_p    of the closed loops, J_p q̇_p = J_a q̇_a                                         (…, 3 N − 3, 3 N − 3)
+    S      q̇ = S q̇_a                                                                                 (…, 3 N, 3)
+    T      twists (angular velocity, velocity of the mass centre) of all bodies from q̇     (…, 6 (2 N + 1), 3 N)
+    G      the same from q̇_a: G = T S, the natural orthogonal complement                     (…, 6 (2 N + 1), 3)
 
 Vectors have their components in the inertial frame that coincides with B at the moment: derivatives are true ones. The
-bodies are the wheels, the links and the platform, in this order. Nothing here uses the operational-space dynamics or
-the kinematics it is built on: a robot's numbers are all that they share, so that agreement means something.
+bodies are the wheels, the links and the platform, in this order. Nothing here uses the operational-space dynamics: the
+chains' kinematics and a robot's numbers are all that they share, so that agreement means something.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.analysis.checked import finite
+from caster_gym.analysis.frames import rate_in_body
+from caster_gym.analysis.joint_kinematics import forward_jacobian, inertial_hessian
+from caster_gym.analysis.mobility import closed, loop_closure
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.dynamics import joint_friction
 from caster_gym.robot import Robot, check_joints
@@ -33,7 +37,6 @@ class Vectors(NamedTuple):
 
     f: Array  # (…, N, 2) rolling directions
     left: Array  # (…, N, 2) f⊥
-    pivot: Array  # (…, N, 2) from C [m]
     com: Array  # (…, 2) mass centre of the platform, from C [m]
     one: float
 
@@ -42,8 +45,8 @@ class Motion(NamedTuple):
     """What independent rates and torques imply."""
 
     twist: Array  # (..., 3) of the platform at C, in B
-    rates: Array  # (..., 3 N) φ̇
-    accelerations: Array  # (..., 3) φ̈_a [rad/s²]
+    rates: Array  # (..., 3 N) q̇
+    accelerations: Array  # (..., 3) q̈_a [rad/s²]
 
 
 class Embedding(NamedTuple):
@@ -55,7 +58,7 @@ class Embedding(NamedTuple):
     g_rate: Array
     k: Array  # of the first caster
     k_rate: Array
-    rates: Array  # φ̇ (…, 3 N)
+    rates: Array  # q̇ (…, 3 N)
     left: Array
 
 
@@ -64,7 +67,7 @@ class OrthogonalComplement:
 
     independent: three joints, such as ("roll_1", "roll_2", "steer_3"); there are configurations in which these do not
     tell how the robot moves, and near them the results are worthless (`condition_number`).
-    as_printed: form the matrix C of (30) and multiply it with the rates, instead of multiplying C φ̇_a from the right,
+    as_printed: form the matrix C of (30) and multiply it with the rates, instead of multiplying C q̇_a from the right,
     vector by vector, which loses less near those configurations.
     steering (..., N) [rad], rates (..., 3) of the independent joints [rad/s], torque (..., 2 N) at all joints [N m];
     leading axes are a batch. Friction of joints and contact patches is included.
@@ -87,16 +90,12 @@ class OrthogonalComplement:
 
     @property
     def dependent(self) -> tuple[str, ...]:
-        """Names of the other joints, yaw_i among them, in the order of φ̇_p."""
+        """Names of the other joints, yaw_i among them, in the order of q̇_p."""
         return tuple(f"{('yaw', 'roll', 'steer')[i % 3]}_{i // 3 + 1}" for i in self._p)
-
-    def forward_jacobians(self, steering: ArrayLike) -> Array:
-        """K_i (..., N, 3, 3): each caster's rates (η̇, θ̇, δ̇) give the platform's twist."""
-        return self._numbers.forward(self._vectors(self._steering(steering)))
 
     def loops(self, steering: ArrayLike) -> tuple[Array, Array]:
         """J_p and J_a: every caster says how the platform moves, and all must say the same."""
-        return self._split(_closures(self.forward_jacobians(steering)))
+        return self._split(loop_closure(self.robot, steering))
 
     def condition_number(self, steering: ArrayLike) -> Array:
         """Of J_p (...), all its rows in m/s: angular velocities times the characteristic length of the robot."""
@@ -105,22 +104,22 @@ class OrthogonalComplement:
         return np.asarray(np.linalg.cond(j_p * rows[:, None]))
 
     def independent_rates(self, steering: ArrayLike, twist: ArrayLike) -> Array:
-        """φ̇_a (..., 3) of a platform twist (..., 3): what has to be computed anew at each change of coordinates."""
+        """q̇_a (..., 3) of a platform twist (..., 3): what has to be computed anew at each change of coordinates."""
         rows = self.model.jacobian(steering, self.independent)
         return np.asarray(np.einsum("...jk,...k->...j", rows, finite("twist", twist, 3)))
 
     def all_rates(self, steering: ArrayLike, rates: ArrayLike) -> Array:
-        """φ̇ (..., 3 N) of the independent rates."""
+        """q̇ (..., 3 N) of the independent rates."""
         s = self._complete(*self.loops(steering))
-        return _times(s, finite("rates", rates, INDEPENDENT))  # (N4)
+        return _times(s, finite("rates", rates, INDEPENDENT))  # (N3)
 
     def twist(self, steering: ArrayLike, rates: ArrayLike) -> Array:
         """Platform twist (..., 3) of the independent rates."""
-        k = self.forward_jacobians(steering)[..., 0, :, :]
-        return _times(k, self.all_rates(steering, rates)[..., :3])  # (N1)
+        k = forward_jacobian(self.robot, steering)[..., 0, :, :]
+        return _times(k, self.all_rates(steering, rates)[..., :3])
 
     def equations(self, steering: ArrayLike, rates: ArrayLike) -> tuple[Array, Array]:
-        """I and C (..., 3, 3) of I φ̈_a + C φ̇_a = Sᵀ τ."""
+        """I and C (..., 3, 3) of I q̈_a + C q̇_a = Sᵀ τ."""
         angles = self._steering(steering)
         e = self._embed(angles, finite("rates", rates, INDEPENDENT))
         return self._inertia(e), self._coriolis(e, np.eye(INDEPENDENT))
@@ -136,50 +135,48 @@ class OrthogonalComplement:
         accelerations, e = self._solve(steering, rates, torque)
         joint = _times(e.s, accelerations) + _times(e.s_rate, rates)
         true = _times(e.k, joint[..., :3]) + _times(e.k_rate, e.rates[..., :3])
-        v = _times(e.k, e.rates[..., :3])
-        turning = v[..., 2:] * np.stack((v[..., 1], -v[..., 0]), -1)
-        return np.concatenate((true[..., :2] + turning, true[..., 2:]), -1)  # (N9)
+        return rate_in_body(true, _times(e.k, e.rates[..., :3]))  # (N8)
 
     def _solve(self, steering: ArrayLike, rates: ArrayLike, torque: ArrayLike) -> tuple[Array, Embedding]:
-        phi_a = finite("rates", rates, INDEPENDENT)
+        q_a = finite("rates", rates, INDEPENDENT)
         torques = finite("torque", torque, 2 * self.robot.caster_count)
-        e = self._embed(self._steering(steering), phi_a)
+        e = self._embed(self._steering(steering), q_a)
         if self.as_printed:
-            inertial = _times(self._coriolis(e, np.eye(INDEPENDENT)), phi_a)
+            inertial = _times(self._coriolis(e, np.eye(INDEPENDENT)), q_a)
         else:
-            inertial = self._coriolis(e, phi_a[..., None])[..., 0]
+            inertial = self._coriolis(e, q_a[..., None])[..., 0]
         effective = _times(np.swapaxes(e.s, -1, -2), self._numbers.applied(e.rates, torques))
-        return self._solved(self._inertia(e), (effective - inertial)[..., None])[..., 0], e  # (N8)
+        return self._solved(self._inertia(e), (effective - inertial)[..., None])[..., 0], e  # (N7)
 
-    def _embed(self, steering: Array, phi_a: Array) -> Embedding:
+    def _embed(self, steering: Array, q_a: Array) -> Embedding:
         """All maps from the independent rates, with their derivatives."""
         vectors = self._vectors(steering)
-        k = self._numbers.forward(vectors)
-        j_p, j_a = self._split(_closures(k))
+        k = forward_jacobian(self.robot, steering)
+        j_p, j_a = self._split(closed(k))
         s = self._complete(j_p, j_a)
-        rates = _times(s, phi_a)
+        rates = _times(s, q_a)
         eta, omega = rates[..., ::3], _times(k[..., 0, :, :], rates[..., :3])[..., 2]
         turning = Vectors(
             eta[..., None] * vectors.left,
             -eta[..., None] * vectors.f,
-            omega[..., None, None] * _turned(vectors.pivot),
             omega[..., None] * _turned(vectors.com),
             0.0,
         )
-        k_rate = self._numbers.forward(turning)
-        j_p_rate, j_a_rate = self._split(_closures(k_rate))
-        p_rate = self._solved(j_p, j_a_rate - j_p_rate @ s[..., self._p, :])  # (N5)
+        by_caster = rates.reshape(*rates.shape[:-1], -1, 1, 3, 1)
+        k_rate = (inertial_hessian(self.robot, steering) @ by_caster)[..., 0]
+        j_p_rate, j_a_rate = self._split(closed(k_rate))
+        p_rate = self._solved(j_p, j_a_rate - j_p_rate @ s[..., self._p, :])  # (N4)
         s_rate = np.zeros((*p_rate.shape[:-2], *s.shape[-2:]))
         s_rate[..., self._p, :] = p_rate
         t = self._numbers.twists(vectors, k[..., 0, :, :])
         t_rate = self._numbers.twists(turning, k_rate[..., 0, :, :])
-        g, g_rate = t @ s, t_rate @ s + t @ s_rate  # (N6)
+        g, g_rate = t @ s, t_rate @ s + t @ s_rate  # (N5)
         return Embedding(s, s_rate, g, g_rate, k[..., 0, :, :], k_rate[..., 0, :, :], rates, vectors.left)
 
     def _inertia(self, e: Embedding) -> Array:
         s_t, g_t = np.swapaxes(e.s, -1, -2), np.swapaxes(e.g, -1, -2)
         rotors = self._numbers.armatures[:, None]
-        return np.asarray(g_t @ self._numbers.momenta(e.g, e.left) + s_t @ (rotors * e.s))  # (N7)
+        return np.asarray(g_t @ self._numbers.momenta(e.g, e.left) + s_t @ (rotors * e.s))  # (N6)
 
     def _coriolis(self, e: Embedding, x: Array) -> Array:
         """C x of columns x (…, 3, k), multiplied from the right: C itself where x is the unit matrix.
@@ -188,17 +185,17 @@ class OrthogonalComplement:
         """
         s_t, g_t = np.swapaxes(e.s, -1, -2), np.swapaxes(e.g, -1, -2)
         rotors = self._numbers.armatures[:, None]
-        return np.asarray(g_t @ self._numbers.momenta(e.g_rate @ x, e.left) + s_t @ (rotors * (e.s_rate @ x)))  # (N7)
+        return np.asarray(g_t @ self._numbers.momenta(e.g_rate @ x, e.left) + s_t @ (rotors * (e.s_rate @ x)))  # (N6)
 
     def _complete(self, j_p: Array, j_a: Array) -> Array:
         s = np.zeros((*j_p.shape[:-2], 3 * self.robot.caster_count, INDEPENDENT))
         s[..., self._a, range(INDEPENDENT)] = 1.0
-        s[..., self._p, :] = self._solved(j_p, j_a)  # (N4)
+        s[..., self._p, :] = self._solved(j_p, j_a)  # (N3)
         return s
 
     def _split(self, closures: Array) -> tuple[Array, Array]:
         """J_p and J_a from the matrix of all closed loops."""
-        return closures[..., self._p], -closures[..., self._a]  # (N2)
+        return closures[..., self._p], -closures[..., self._a]  # (N1)
 
     def _solved(self, matrix: Array, right: Array) -> Array:
         try:
@@ -212,7 +209,7 @@ class OrthogonalComplement:
 
     def _vectors(self, steering: Array) -> Vectors:
         f = np.stack((np.cos(steering), np.sin(steering)), -1)
-        return Vectors(f, _turned(f), self._numbers.pivots, self._numbers.com, 1.0)
+        return Vectors(f, _turned(f), self._numbers.com, 1.0)
 
 
 class _Numbers:
@@ -224,9 +221,7 @@ class _Numbers:
 
         casters = robot.casters
         self.count = len(casters)
-        self.pivots = np.array([(c.x, c.y) for c in casters])
         self.com = np.array(robot.platform.com)
-        self.trail, self.offset = column([c.trail for c in casters]), column([c.offset for c in casters])
         self.radius = column([c.radius for c in casters])
         self.ahead = column([c.trail - c.link.com[0] for c in casters])  # p: from the wheel's centre to the link's
         self.right = column([c.offset - c.link.com[1] for c in casters])  # σ
@@ -238,16 +233,6 @@ class _Numbers:
         self.armatures = np.array([j for c in casters for j in (0.0, c.roll.armature, c.steer.armature)])
         self.viscous = np.array([b for c in casters for b in (c.scrub, c.roll.viscous, c.steer.viscous)])
         self.coulomb = np.array([b for c in casters for b in (0.0, c.roll.coulomb, c.steer.coulomb)])
-
-    def forward(self, v: Vectors) -> Array:
-        """K_i (…, N, 3, 3), or its rate of change."""
-        k = np.zeros((*v.f.shape[:-1], 3, 3))
-        across = _turned(v.pivot)
-        k[..., :2, 0] = self.offset * v.f + self.trail * v.left - across
-        k[..., :2, 1] = self.radius * v.f
-        k[..., :2, 2] = across
-        k[..., 2, 0], k[..., 2, 2] = v.one, -v.one  # (N1)
-        return k
 
     def twists(self, v: Vectors, k: Array) -> Array:
         """T, or its rate of change; k of the first caster."""
@@ -262,7 +247,7 @@ class _Numbers:
             t[..., n + i, 3:5, eta] = self.right[i] * v.f[..., i, :] + self.ahead[i] * v.left[..., i, :]
         t[..., 2 * n, 2, :3] = k[..., 2, :]
         t[..., 2 * n, 3:5, :3] = k[..., :2, :]
-        t[..., 2 * n, 3:5, :3] += _turned(v.com)[..., None] * [1.0, 0.0, -1.0]  # (N6)
+        t[..., 2 * n, 3:5, :3] += _turned(v.com)[..., None] * [1.0, 0.0, -1.0]  # (N5)
         return t.reshape(*t.shape[:-3], -1, 3 * n)
 
     def momenta(self, twists: Array, left: Array) -> Array:
@@ -283,16 +268,6 @@ class _Numbers:
         return tau
 
 
-def _closures(k: Array) -> Array:
-    """(…, 3 N − 3, 3 N): what the first caster says of the platform's twist less what each other one says."""
-    n = k.shape[-3]
-    a = np.zeros((*k.shape[:-3], n - 1, 3, n, 3))
-    for i in range(1, n):
-        a[..., i - 1, :, 0, :] = k[..., 0, :, :]
-        a[..., i - 1, :, i, :] = -k[..., i, :, :]
-    return a.reshape(*k.shape[:-3], 3 * n - 3, 3 * n)  # (N2)
-
-
 def _turned(v: Array) -> Array:
     """ẑ × v."""
     return np.stack((-v[..., 1], v[..., 0]), -1)
@@ -300,13 +275,3 @@ def _turned(v: Array) -> Array:
 
 def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray((matrix @ vector[..., None])[..., 0])
-
-
-def finite(name: str, value: Any, last: int) -> Array:
-    """The value as an array of finite numbers whose last axis has the right length."""
-    array = np.asarray(value, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != last:
-        raise ValueError(f"{name} must have a last axis of {last}, got shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-    return array

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.analysis.checked import finite
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import wheel_centre
 from caster_gym.mechanics.parameters import CasterParameters, robot_parameters
@@ -28,6 +29,7 @@ from caster_gym.robot import Robot, check_joints
 Array = NDArray[np.float64]
 
 MEETS = 1e-9  # [-] gap up to which lines meet, share of L beyond 1/MEETS of which they are parallel: far above rounding
+_UNIT = 1e-6  # [-] by which the directions of given lines may miss unit length
 _ONE_LINE = 1e-12  # [-] lines nearer to each other than this are one and the same
 
 
@@ -56,11 +58,7 @@ def action_lines(robot: Robot, steering: ArrayLike, joints: str | Sequence[str] 
 
     Raises ValueError for an unknown joint, and for steering of the wrong last axis or not finite.
     """
-    angles = np.asarray(steering, dtype=np.float64)
-    if angles.ndim == 0 or angles.shape[-1] != robot.caster_count:
-        raise ValueError(f"steering must have a last axis of {robot.caster_count}, got shape {angles.shape}")
-    if not np.isfinite(angles).all():
-        raise ValueError(f"steering must be finite, got {angles[~np.isfinite(angles)][0]}")
+    angles = finite("steering", steering, robot.caster_count)
     casters = robot_parameters(robot).casters
     lines = []
     for kind, i in map(kind_and_caster, named_joints(robot, joints)):
@@ -73,11 +71,16 @@ def meeting(lines: ArrayLike, length: float) -> Meeting:
 
     length: L [m], such as `Model.characteristic_length`. Two lines always meet or are parallel, as does one alone.
     The smallest singular value σ of the matrix of the lines, its moments divided by L, is the gap up to a factor:
-    gap/√3 ≤ σ ≤ √(J − 2) gap for J ≥ 3 lines. Raises ValueError for lines of another shape and a length not positive.
+    gap/√3 ≤ σ ≤ √(J − 2) gap for J ≥ 3 lines. Raises ValueError for lines of another shape, not finite or
+    without a direction of unit length, and for a length that is not positive.
     """
     given = np.asarray(lines, dtype=np.float64)
     if given.ndim < 2 or given.shape[-1] != 3 or given.shape[-2] == 0:
         raise ValueError(f"lines must have shape (..., J, 3) with one line or more, got {given.shape}")
+    sizes = np.hypot(finite("lines", given, 3)[..., 0], given[..., 1])
+    if (np.abs(sizes - 1.0) > _UNIT).any():
+        worst = sizes.flat[np.abs(sizes - 1.0).argmax()]
+        raise ValueError(f"lines must begin with unit vectors, got one of length {worst:g}")
     if not (np.isfinite(length) and length > 0.0):
         raise ValueError(f"length must be positive and finite, got {length}")
     scaled = given / (1.0, 1.0, length)

@@ -51,7 +51,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.single_action_space = action_space(engine)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._generators: list[np.random.Generator | None] = [None] * self.num_envs
+        self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
         self._started = False
         self._done: Flags = np.zeros(self.num_envs, dtype=np.bool_)
         self._observations: Observations = np.zeros((self.num_envs, engine.layout.size), dtype=np.float32)
@@ -67,11 +67,11 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
         selected = np.flatnonzero(mask)
         for robot, chosen in zip(selected.tolist(), np.array(self._seeds(seed), dtype=object)[mask], strict=True):
-            if chosen is not None or self._generators[robot] is None:
+            if chosen is not None or not self._seeded[robot]:
                 generator, _ = seeding.np_random(chosen)
-                self._generators[robot] = generator
+                self._seeded[robot] = True
                 self.engine.seed(robot, int(generator.integers(2**63)))
-        self._started = None not in self._generators
+        self._started = bool(self._seeded.all())
         self._done = self._done & ~mask
         outcome = self.engine.restart(selected, path=path[mask])
         self._observations = np.where(mask[:, None], outcome.observations, self._observations)

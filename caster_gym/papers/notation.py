@@ -73,9 +73,13 @@ def in_letters(joints: Sequence[str]) -> str:
 
 
 def in_words(letters: str) -> tuple[str, ...]:
-    """("roll_1", "steer_1", "roll_2") for "θ_1 φ_1 θ_2"."""
+    """("roll_1", "steer_1", "roll_2") for "θ_1 φ_1 θ_2". Raises ValueError for anything else."""
     kinds = {letter: kind for kind, letter in _LETTERS.items()}
-    return tuple(f"{kinds[joint[0]]}_{joint[2:]}" for joint in letters.split())
+    joints = [joint.partition("_") for joint in letters.split()]
+    unknown = [letter + mark + number for letter, mark, number in joints if letter not in kinds or not number.isdigit()]
+    if unknown:
+        raise ValueError(f"a joint must be a letter θ or φ with a number, such as θ_1, got {unknown[0]!r}")
+    return tuple(f"{kinds[letter]}_{number}" for letter, _, number in joints)
 
 
 def kim2001_robot(radius: float, trail: float, a: float = 1.0) -> Robot:

@@ -3,13 +3,14 @@
 A paper's page is made of sections, each built by a function of its own. The files are
 
     NAME.md                  the page
-    NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict
+    NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict, own = True where it is our own
     NAME/differences.csv     where the paper and we differ, with the evidence
     differences.md           all differences of all papers whose folders are there
 """
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,13 +23,14 @@ DOTS_PER_INCH = 110
 
 
 class Check(NamedTuple):
-    """One thing that a paper prints, beside ours."""
+    """One thing that a paper prints, beside ours; or one of our own, beside what it must be."""
 
     what: str
-    printed: str
+    printed: str  # or expected, if the check is our own
     ours: str
     agrees: bool
     remark: str = ""  # why they differ, or what the agreement rests on
+    own: bool = False  # nothing that the paper prints: it stands and counts apart
 
 
 class Table(NamedTuple):
@@ -44,6 +46,7 @@ class Picture(NamedTuple):
     """A drawn figure."""
 
     name: str  # of its file, without .png; unique in a paper
+    title: str  # a few words for who cannot see it
     caption: str
     figure: "Figure"
 
@@ -69,6 +72,18 @@ class Section(NamedTuple):
     differences: tuple[Difference, ...] = ()
 
 
+def printed_checks(sections: Iterable[Section]) -> tuple[Check, ...]:
+    """The checks of what the paper prints, without those of our own."""
+    return tuple(check for section in sections for check in section.checks if not check.own)
+
+
+def unexplained(sections: Sequence[Section]) -> tuple[str, ...]:
+    """What the checks say that fail without naming, in their remark, a difference of these sections."""
+    tags = {difference.tag for section in sections for difference in section.differences}
+    failed = (check for section in sections for check in section.checks if not check.agrees)
+    return tuple(check.what for check in failed if tags.isdisjoint(re.findall(r"E\d+", check.remark)))
+
+
 def check_number(what: str, printed: str, ours: float, tolerance: float | None = None, remark: str = "") -> Check:
     """Compare a number with its printed digits; agreement is within half a unit of the last, or a given tolerance."""
     allowed = _half_unit(printed) if tolerance is None else tolerance
@@ -91,10 +106,9 @@ def write_page(name: str, title: str, reference: str, sections: Sequence[Section
             _write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
         for picture in section.pictures:
             picture.figure.savefig(folder / f"{picture.name}.png", dpi=DOTS_PER_INCH)
-    checks = [check for section in sections for check in section.checks]
-    _write_csv(folder / "checks.csv", Check._fields, checks)
+    _write_csv(folder / "checks.csv", Check._fields, [check for section in sections for check in section.checks])
     _write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
-    return _page(name, title, reference, sections, checks)
+    return _page(name, title, reference, sections)
 
 
 def differences_page(out: Path, names: Sequence[str]) -> str:
@@ -114,25 +128,35 @@ def differences_page(out: Path, names: Sequence[str]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _page(name: str, title: str, reference: str, sections: Sequence[Section], checks: Sequence[Check]) -> str:
-    agreeing = sum(check.agrees for check in checks)
+def _page(name: str, title: str, reference: str, sections: Sequence[Section]) -> str:
+    printed = printed_checks(sections)
+    own = [check for section in sections for check in section.checks if check.own]
     summary = (
-        f"{agreeing} of {len(checks)} printed numbers and statements agree; the reason stands beside each other, and "
-        f"[differences.md](differences.md) lists them with the evidence. Made by `caster-gym reproduce {name}`."
+        f"{sum(check.agrees for check in printed)} of {len(printed)} printed numbers and statements agree; the reason "
+        f"stands beside each other, and [differences.md](differences.md) lists them with the evidence."
     )
+    if own:
+        summary += f" Checks of our own stand apart; {sum(check.agrees for check in own)} of {len(own)} hold."
+    summary += f" Made by `caster-gym reproduce {name}`."
     parts = [f"# {title}", reference, summary]
     for section in sections:
         parts += [f"## {section.title}", section.text.strip()]
-        if section.checks:
-            rows = [(c.what, c.printed, c.ours, "pass" if c.agrees else "**fail**", c.remark) for c in section.checks]
-            parts.append(markdown_table(("what", "printed", "ours", "verdict", "remark"), rows))
+        parts += _verdicts([check for check in section.checks if not check.own], ("what", "printed", "ours"))
+        own = [check for check in section.checks if check.own]
+        parts += ["Checks of our own:"] * bool(own) + _verdicts(own, ("what", "expected", "found"))
         for table in section.tables:
             parts.append(f"{table.caption} ([{table.name}.csv]({name}/{table.name}.csv))")
             if len(table.rows) <= LONGEST_TABLE:
                 parts.append(markdown_table(table.columns, table.rows))
         for picture in section.pictures:
-            parts += [f"![{picture.caption}]({name}/{picture.name}.png)", f"*{picture.caption}*"]
+            parts += [f"![{picture.title}]({name}/{picture.name}.png)", f"*{picture.caption}*"]
     return "\n\n".join(parts) + "\n"
+
+
+def _verdicts(checks: Sequence[Check], columns: tuple[str, str, str]) -> list[str]:
+    """A table of checks, if there are any."""
+    rows = [(c.what, c.printed, c.ours, "pass" if c.agrees else "**fail**", c.remark) for c in checks]
+    return [markdown_table((*columns, "verdict", "remark"), rows)] if rows else []
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]]) -> str:

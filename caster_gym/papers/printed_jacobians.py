@@ -10,11 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from caster_gym.papers.notation import CHUNG2008, KIM2001, Array, Lengths, Notation, lengths_of
-from caster_gym.papers.page import Check
+from caster_gym.papers.notation import CHUNG2008, KIM2001, Array, Lengths, Notation
 from caster_gym.robot import Robot
-
-ROUNDING = 1e-12  # [-] of the greatest entry: a few dozen roundings of 1e-16
 
 Matrix = NDArray[Any]
 Rows = tuple[tuple[Any, Any, Any], ...]
@@ -63,46 +60,6 @@ class Printed(NamedTuple):
         if self.forward:
             return self.notation.forward_jacobian(robot, phi)[..., casters[0], :, :]
         return self.notation.inverse_jacobian(robot, phi)[..., casters, chosen, :]
-
-
-class Comparison(NamedTuple):
-    """A printed matrix beside the mechanics; deviations are shares of the greatest entry."""
-
-    as_printed: float
-    corrected: float
-    wrong: tuple[tuple[int, int], ...]  # row and column, from 1, of the entries that differ as printed
-    by: float  # greatest deviation of an entry, in its own unit
-
-    @property
-    def places(self) -> str:
-        """The wrong entries in words, whole rows as such; empty if there are none."""
-        rows = {row: [column for at, column in self.wrong if at == row] for row, _ in self.wrong}
-        return "; ".join(
-            f"row {row}" if len(columns) == 3 else f"row {row}, column {', '.join(map(str, columns))}"
-            for row, columns in rows.items()
-        )
-
-
-def compare(matrix: Printed, robot: Robot, phi: ArrayLike) -> Comparison:
-    """A printed matrix beside the mechanics of a robot at many φ (..., 3). Raises ValueError as `lengths_of`."""
-    lengths = lengths_of(robot)
-    ours = matrix.from_mechanics(robot, phi)
-    greatest = np.abs(ours).max()
-    off = np.abs(matrix(phi, lengths) - ours).reshape(-1, *ours.shape[-2:]).max(axis=0)
-    mended = np.abs(matrix(phi, lengths, corrected=True) - ours).max()
-    wrong = tuple((int(row) + 1, int(column) + 1) for row, column in np.argwhere(off > ROUNDING * greatest))
-    return Comparison(float(off.max() / greatest), float(mended / greatest), wrong, float(off.max()))
-
-
-def check_matrix(matrix: Printed, robot: Robot, phi: ArrayLike) -> Check:
-    """The verdict on a printed matrix, whose remark names the wrong entries and the erratum."""
-    found = compare(matrix, robot, phi)
-    what = f"{matrix.equation}: matrix of ({', '.join(matrix.joints)})"
-    if not found.wrong:
-        return Check(what, "as printed", f"equal within {found.as_printed:.0e} of its greatest entry", True)
-    ours = f"differs in {found.places}, by up to {found.by:.3g}"
-    remark = f"{matrix.tag}; corrected it agrees within {found.corrected:.0e} of its greatest entry"
-    return Check(what, "as printed", ours, False, remark)
 
 
 def _over_dr(rows: Rows, p: Lengths) -> Rows:

@@ -40,10 +40,11 @@ def section() -> Section:
         checks=(
             Check(
                 "Fig. 18 lies on a curve of uniform configurations",
-                '"a uniform ellipsoid"',
+                "on one",
                 f"on the {KINDS[holding.index(True)]} one" if any(holding) else "on none",
                 any(holding),
                 "as near as the rounding of the pivots lets it",
+                own=True,
             ),
         ),
         tables=(_table_of_curves(model, curves), others),
@@ -172,7 +173,7 @@ def _picture_of_curves(model: Model, curves: list[CircleCurve]) -> Picture:
             axis.set_title(f"{kind} {k + 1}, {size} N s\nφ = ({angles})", fontsize=9)
             axis.set(xlabel="x [m]", xticks=(-0.1, 0.0, 0.1), yticks=(-0.1, 0.0, 0.1))
             plane.plot(x, y, "o", color="none", markeredgecolor=COLOURS[3], markersize=10)
-            offset, side = ((8, -10), "left") if x < 60.0 else ((-8, 6), "right")  # beside the curves, within the axes
+            offset, side = ((8, -10), "left") if kind == KINDS[0] else ((-8, 6), "right")  # beside both curves
             plane.annotate(f"{kind} {k + 1}", (x, y), offset, textcoords="offset points", ha=side, color=COLOURS[3])
     robots[0].set_ylabel("y [m]")
     figure.colorbar(shades, ax=plane, label="φ₃ [°], up to half turns", ticks=range(0, 181, 45))
@@ -187,7 +188,7 @@ def _picture_of_curves(model: Model, curves: list[CircleCurve]) -> Picture:
         "Every configuration of uniform impulse, up to half turns of the casters, and right the four that are ringed. "
         "Along both curves all three angles go round once. The straight curve is the symmetric one."
     )
-    return Picture("uniform_impulses", caption, figure)
+    return Picture("uniform_impulses", "Configurations of uniform impulse", caption, figure)
 
 
 def _picture_of_robots() -> Picture:
@@ -214,4 +215,4 @@ def _picture_of_robots() -> Picture:
         "Effective mass of C over all directions of the motion, all wheels parallel to x; dotted the ellipse with the "
         "same half axes. Where the ratio of greatest to least exceeds 2 the curve is dented."
     )
-    return Picture("impulse_of_other_robots", caption, figure)
+    return Picture("impulse_of_other_robots", "Effective mass over all directions, three robots", caption, figure)

@@ -43,6 +43,7 @@ Array = NDArray[np.float64]
 
 LIMITS = (LIMIT, 1000.0)
 PAPER_ALONE, CHANGED = f"{in_letters(PAPER_SET)} alone", "changed above {:g}"
+LOST = 1.0  # [m] from the place, or no number at all: a simulation is lost
 BATCH, REPEATS = 1000, 9  # robots at a time, and how often the time is taken
 
 
@@ -78,8 +79,8 @@ def section() -> Section:
     text = f"""
 The paper's first algorithm writes the dynamics in three independent joint rates. Its equations (20) to (30) and (A3) to
 (A10) stand, sign by sign, and for any three joints they give the twist rate of the operational-space model to rounding,
-as long as J_p is well conditioned. That model was derived in another way, so each confirms the other; both contain the
-term that (49) lacks (E3). The "joint torque vector" of (27) is τ = Gᵀ wᴱ: torques at the dependent joints enter it
+as long as J_p is well conditioned. Its dynamics were derived in another way, so each confirms the other; both contain
+the term that (49) lacks (E3). The "joint torque vector" of (27) is τ = Gᵀ wᴱ: torques at the dependent joints enter it
 through (21), τ = τ_a + (J_p⁻¹ J_a)ᵀ τ_p. The term GᵀWMG of (30) is zero for every such robot, as the gyroscopic moment
 of a wheel points along its rolling direction, where the floor takes it.
 
@@ -95,9 +96,9 @@ cases. Multiplied from the right, vector by vector, C is never formed and the po
 Changing the independent joints mends it. Along {PERIOD:g} s of driving, a circle of {RADIUS:g} m while the heading
 swings, every one of the {len(complements)} sets passes a condition number of {numbers.max(axis=0).min():.0f} somewhere;
 a change whenever {LIMIT:g} is passed takes {changes} changes. Simulated under the same torques, the set of (A9) alone
-ends {1000.0 * gaps[0][-1]:.1f} mm beside the place of the operational-space model, and the changing sets
-{1000.0 * gaps[1][-1]:.0e} mm. At each change the condition numbers of all sets are needed, and the rates, which are the
-state, have to be computed anew from the twist.
+{_ending(gaps[0])} of the operational-space model, a simulation with changing sets
+{_ending(gaps[1])}. At each change the condition numbers of all sets
+are needed, and the rates, which are the state, have to be computed anew from the twist.
 """
     return Section(
         "Natural orthogonal complement: (20) to (30), (A3) to (A10)",
@@ -133,7 +134,7 @@ def _switching(complements: tuple[OrthogonalComplement, ...], paper: OrthogonalC
     best = complements[int(numbers.max(axis=0).argmin())]
     ways: dict[str, tuple[tuple[OrthogonalComplement, ...], float]] = {
         PAPER_ALONE: ((paper,), np.inf),
-        f"{in_letters(best.independent)} alone, the best": ((best,), np.inf),
+        f"{in_letters(best.independent)} alone, the best condition number": ((best,), np.inf),
     }
     ways |= {CHANGED.format(limit): (complements, limit) for limit in LIMITS}
     rows: list[tuple[str | float, ...]] = []
@@ -151,7 +152,7 @@ def _switching(complements: tuple[OrthogonalComplement, ...], paper: OrthogonalC
                 str(walk.examined if len(sets) > 1 else 0),
                 float(numbers[np.arange(len(chosen)), chosen].max()),
                 float(error),
-                float(1000.0 * gaps[name].max()),
+                1000.0 * lost if (lost := float(gaps[name].max())) < LOST else _ending(gaps[name]),
             )
         )
     table = Table(
@@ -164,6 +165,13 @@ def _switching(complements: tuple[OrthogonalComplement, ...], paper: OrthogonalC
         rows,
     )
     return _Switching(table, gaps)
+
+
+def _ending(gap: Array) -> str:
+    """Where a simulation ends beside the place that it should have reached; distances over time [m]."""
+    if gap.max() < LOST:
+        return f"ends {1000.0 * gap[-1]:.2g} mm beside the place"
+    return f"is lost after {STEP * int(np.argmin(gap < LOST)):.2f} s"
 
 
 def _cost(complements: tuple[OrthogonalComplement, ...], paper: OrthogonalComplement, driven: Drive) -> Table:
@@ -199,13 +207,13 @@ def _cost(complements: tuple[OrthogonalComplement, ...], paper: OrthogonalComple
             [[_seconds(way, (steering, twist, torque), calls) for way in ways.values()] for _ in range(REPEATS)]
         )
         for name, seconds in zip(ways, taken.T, strict=True):
-            low, high = np.quantile(seconds / taken[:, 0], (0.25, 0.75))
-            ratio = f"{seconds.min() / taken[:, 0].min():.1f} ({low:.1f} to {high:.1f})"
-            rows.append((name, str(count), float(1e6 * seconds.min() / count), ratio))
+            low, middle, high = np.quantile(seconds / taken[:, 0], (0.25, 0.5, 0.75))
+            ratio = f"{middle:.1f} ({low:.1f} to {high:.1f})"
+            rows.append((name, str(count), float(1e6 * np.median(seconds) / count), ratio))
     return Table(
         "complement_cost",
-        f"Time of a twist rate in NumPy, all robots of a batch in one call, on the machine that made this page: least "
-        f"of {REPEATS} rounds; ratio of the least times, and between which ratios the middle half of the rounds lies. "
+        f"Time of a twist rate in NumPy, all robots of a batch in one call, on the machine that made this page: "
+        f"median of {REPEATS} rounds, and median and quartiles of the ratios to the first way in the same round. "
         f"One robot at a time costs little but the overhead of Python.",
         ("way", "robots at a time", "µs per robot", "ratio"),
         rows,

@@ -34,7 +34,7 @@ def picture_of_singularity(complement: OrthogonalComplement, distances: Array, n
         draw_lines(floor, complement.robot, steering, complement.independent, VIEW)
     floor.set(title=f"{in_letters(complement.independent)} singular", xlabel="x [m]", ylabel="y [m]")
     _band(number, distances, near.condition_numbers, BAD, "J_p of the singular set")
-    _band(number, distances, near.inertia_numbers, PLAIN, "inertia of the operational space")
+    _band(number, distances, near.inertia_numbers, PLAIN, "operational-space model: its inertia")
     number.set(title="Condition number", xlabel="distance from the singularity [rad]", ylabel="condition number [-]")
     _band(error, distances, near.printed_errors, BAD, "complement, as printed")
     _band(error, distances, near.errors, BETTER, "complement, vector by vector")
@@ -53,7 +53,7 @@ def picture_of_singularity(complement: OrthogonalComplement, distances: Array, n
         f"the way to {len(near.errors)} singular configurations of all sets of three joints, median and range. Errors "
         f"are relative to the operational-space model, which needs no set; they end at 1, where no digit is right."
     )
-    return Picture("complement_singularity", caption, figure)
+    return Picture("complement_singularity", "Condition and error near singularities", caption, figure)
 
 
 def picture_of_path(
@@ -77,7 +77,7 @@ def picture_of_path(
         error.semilogy(times, np.maximum(values, LEAST), color=colour, label=label)
     error.set(ylabel="relative error of\nthe twist rate [-]")
     for values, colour in zip(gaps, (BAD, GOOD), strict=True):
-        gap.semilogy(times, np.maximum(values[1:], 1e-12), color=colour)
+        gap.semilogy(times, np.clip(values[1:], 1e-12, 1.0), color=colour)
     gap.set(ylabel="error of the\nsimulated place [m]", xlabel="time [s]")
     for axis in figure.axes:
         for change in times[1:][np.diff(chosen) != 0]:
@@ -90,7 +90,7 @@ def picture_of_path(
         f"independent joint rates and in the operational space, under the same torques: the paper's set loses its way "
         f"at a singularity and never finds it again."
     )
-    return Picture("complement_path", caption, figure)
+    return Picture("complement_path", "Condition and error along a drive", caption, figure)
 
 
 def _band(axis: "Axes", x: Array, values: Array, colour: str, label: str) -> None:

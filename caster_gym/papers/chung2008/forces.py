@@ -156,17 +156,19 @@ def _motion_checks(motion: DrivenMotion, robot: Robot) -> tuple[Check, ...]:
             "the casters have to start at these angles; from others they come to them within a few trails",
         ),
         Check(
-            "Fig. 6(a), (c): ways of the wheels, integrated, beside the circles of their centres [m]",
-            "—",
-            ", ".join(f"{a:.6f} ({b:.6f})" for a, b in zip(rolled, ways, strict=True)),
+            "Fig. 6(a): ways of the wheels, integrated, beside the circles of their centres [m]",
+            ", ".join(f"{way:.6f}" for way in ways),
+            ", ".join(f"{way:.6f}" for way in rolled),
             np.allclose(rolled, ways, rtol=CLOSE, atol=0.0),
+            own=True,
         ),
         Check(
             "Fig. 6(c): rates of the integrated driving angles, beside those of the inverse kinematics",
-            "—",
+            "equal",
             f"within {slip:.1e} of the greatest",
             slip < CLOSE,
             "a spline's derivative",
+            own=True,
         ),
         Check(
             "Fig. 7: kinetic energy with wheels is larger than without",
@@ -208,12 +210,13 @@ def _force_checks(motion: DrivenMotion, forces: Forces, robot: Robot) -> tuple[C
         checks.append(
             Check(
                 f"Figs. 7–9: the work of {name} is the kinetic energy",
-                "—",
+                "equal",
                 f"within {gap:.1e} of the greatest",
                 gap < CLOSE,
                 "the missing term has no power, so that energy cannot tell the two models apart"
                 if name == "the printed model"
                 else "",
+                own=True,
             )
         )
     return tuple(checks)

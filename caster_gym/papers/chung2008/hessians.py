@@ -4,12 +4,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from caster_gym.analysis.frames import turned
 from caster_gym.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
 from caster_gym.papers.chung2008.kinematics import Sample
 from caster_gym.papers.drawing import COLOURS, new_figure
+from caster_gym.papers.jacobian_checks import ROUNDING
 from caster_gym.papers.notation import CHUNG2008, Array
 from caster_gym.papers.page import Check, Difference, Picture, Section, Table
-from caster_gym.papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE, ROUNDING
+from caster_gym.papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 from caster_gym.robot import Robot
 
 if TYPE_CHECKING:
@@ -55,6 +57,8 @@ def _checks(sample: Sample) -> tuple[Check, ...]:
     skew, over_ground = (0.5 * np.abs(h - np.swapaxes(h, -1, -2)) for h in (ours, ground))
     pair = float(over_ground[..., THETA, ETA].max())
     over_ground[..., THETA, ETA] = over_ground[..., ETA, THETA] = 0.0
+    rest = float(over_ground.max())
+    others = f"at most {rest:.0e} m of other pairs" if rest else "none of other pairs"
     symmetric = 0.5 * (ours + np.swapaxes(ours, -1, -2))
     form_off = float(np.abs(_quadratic(symmetric, sample.rates) - _quadratic(ours, sample.rates)).max())
     linkage, share = _linkage_error(sample)
@@ -83,7 +87,7 @@ def _checks(sample: Sample) -> tuple[Check, ...]:
         Check(
             'A.1: "Position Hessian matrix is symmetric"',
             "symmetric",
-            f"skew up to {skew.max():.3g} m; over ground {pair:.3g} m (r/2) of θ and η, else {over_ground.max():.0e} m",
+            f"skew up to {skew.max():.3g} m; over ground {pair:.3g} m (r/2) of θ and η, {others}",
             bool(skew.max() < ROUNDING),
             f"E12: its symmetric part would do as well in (18), within {form_off:.0e} m/s²; the "
             f"symmetric array of a linkage with a slider for θ would be wrong by up to {linkage:.2g} m/s², "
@@ -167,8 +171,8 @@ def _printed_inverse_hessian(sample: Sample) -> Array:
     """−Gᵀ (G ∘ H) G, plane by plane, of the printed (15), (16) corrected, (17); the product ∘ is (A2)."""
     g = np.stack([matrix(sample.phi, sample.lengths, corrected=True) for matrix in CHUNG2008_INVERSE], -3)
     planes = np.einsum("...ij,...jkl->...ikl", g, _printed_hessian(sample))  # (A2)
-    turned: Array = -np.swapaxes(g, -1, -2)[..., None, :, :] @ planes @ g[..., None, :, :]
-    return turned
+    inverse: Array = -np.swapaxes(g, -1, -2)[..., None, :, :] @ planes @ g[..., None, :, :]
+    return inverse
 
 
 def _linkage_error(sample: Sample) -> tuple[float, float]:
@@ -190,7 +194,7 @@ def _loop_picture(robot: Robot) -> Picture:
         f"lead back, C is {1000 * gap:.1f} mm off: the pair without symmetry. Steering leads back with either. "
         "Right: the gap over the square of the turn tends to r, the skew entry of the Hessian."
     )
-    return Picture("kinematics_loops", caption, figure)
+    return Picture("kinematics_loops", "Joints turned forth and back", caption, figure)
 
 
 def _draw_loops(robot: Robot) -> "Figure":
@@ -228,9 +232,8 @@ def _loop(robot: Robot, first: int, second: int, size: float, steps: int = 30) -
         change[joint] = sign * size / steps
         for _ in range(steps):
             midway = np.full(robot.caster_count, delta + 0.5 * change[DELTA])
-            vx, vy, turn = forward_jacobian(robot, midway)[0] @ change
-            c, s = np.cos(pose[2] + 0.5 * turn), np.sin(pose[2] + 0.5 * turn)
-            pose = pose + np.array([c * vx - s * vy, s * vx + c * vy, turn])
+            way = forward_jacobian(robot, midway)[0] @ change
+            pose = pose + turned(way, np.exp(1j * (pose[2] + 0.5 * way[2])))
             delta += change[DELTA]
             poses.append(pose)
     return np.array(poses)

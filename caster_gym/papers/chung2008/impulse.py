@@ -145,7 +145,7 @@ def _picture(model: Model, bare: Model) -> Picture:
         "Figs. 16 to 19 and Fig. 18 mirrored. Above: the steering, in the body frame. Below: the impulse over all "
         "directions of the motion. Of these five it is uniform in Fig. 18 alone; without wheels it always is."
     )
-    return Picture("impulse_shapes", caption, figure)
+    return Picture("impulse_shapes", "Impulse over all directions, Figs. 16 to 19", caption, figure)
 
 
 def _ratio(size: float) -> float:

@@ -5,22 +5,26 @@ from numpy.typing import ArrayLike
 
 from caster_gym.analysis import mobility
 from caster_gym.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
+from caster_gym.analysis.joint_sets import JointSet, classify_all, proved_bounds
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
-from caster_gym.papers.notation import CHUNG2008, Array, Lengths, lengths_of
-from caster_gym.papers.page import Check, Difference, Section, Table
-from caster_gym.papers.printed_jacobians import (
-    CHUNG2008_FORWARD,
-    CHUNG2008_INVERSE,
+from caster_gym.papers.jacobian_checks import (
     ROUNDING,
-    Printed,
+    check_inverse,
     check_matrix,
     compare,
+    comparison_table,
+    off_inverse,
 )
+from caster_gym.papers.notation import CHUNG2008, Array, Lengths, in_letters, lengths_of
+from caster_gym.papers.page import Check, Difference, Section
+from caster_gym.papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 from caster_gym.robot import load_robot
 
 COUNT = 1000  # random configurations
+ALL = (*CHUNG2008_FORWARD, *CHUNG2008_INVERSE)
+MORE_THAN = 4  # motors that the robot "must use … to avoid singularity"
 
 _K = np.array([0.0, 0.0, 1.0])
 
@@ -54,6 +58,7 @@ class Sample:
 def section() -> Section:
     """Mobility (1), velocities (3) to (8) and (35) to (38), Jacobians (12) to (17)."""
     sample = Sample()
+    sets = classify_all(sample.robot)
     text = (
         "The paper counts the freedoms of the robot and writes each wheel as a chain from the ground to the platform. "
         "The printed matrices are set beside ours, translated by φ = π − δ and by the sign of θ̇, at "
@@ -61,15 +66,50 @@ def section() -> Section:
         "not add up to η̇ + φ̇ = ω.\n\n"
         "The rank of the loop closure shows that the three freedoms of Grübler's formula exist as motions at every "
         "configuration, since the determinant of each chain is d r. The paper's \"unless it is in singular "
-        'configuration" never applies to the robot itself: singular can only be a choice of driven joints.'
+        'configuration" never applies to the robot itself: singular can only be a choice of driven joints. How many '
+        "motors the choice needs, the introduction says in one sentence twice: more than four, and two on two of the "
+        "three wheels, which are four; kim2001 and our own search through all sets have the second."
     )
     return Section(
         "Kinematics (section 2)",
         text,
-        checks=(*_mobility_checks(sample), *_jacobian_checks(sample), *_body_checks(sample)),
-        tables=(_entries(sample),),
-        differences=(_difference(sample),),
+        checks=(_motor_check(sets), *_mobility_checks(sample), *_jacobian_checks(sample), *_body_checks(sample)),
+        tables=(comparison_table(ALL, sample.robot, sample.phi),),
+        differences=(_difference(sample), _motor_difference(sample, sets)),
     )
+
+
+def _motor_check(sets: tuple[JointSet, ...]) -> Check:
+    enough = _fewest(sets)
+    return Check(
+        "introduction, on Campion et al.: motors that three casters need to avoid singularity",
+        "more than four",
+        f"{len(enough[0].joints)}: " + ", ".join(in_letters(one.joints) for one in enough),
+        len(enough[0].joints) > MORE_THAN,
+        'E27: its own "two motors on two of the three wheels" are four',
+    )
+
+
+def _motor_difference(sample: Sample, sets: tuple[JointSet, ...]) -> Difference:
+    enough = _fewest(sets)
+    bounds = proved_bounds(sample.robot, enough)
+    every = [s.singular for s in sets if len(s.joints) == MORE_THAN + 1]
+    return Difference(
+        "E27",
+        "introduction, on Campion et al. [1]",
+        "must use more than four motors to avoid singularity",
+        "four are enough, two on each of two wheels, as the same sentence goes on and kim2001, III says",
+        f"of all {len(sets)} sets of joints the smallest without singularity have {len(enough[0].joints)}: "
+        f"{', '.join(in_letters(s.joints) for s in enough)}, smallest singular value of unit lines at least "
+        f"{min(bounds.values()):.2f} everywhere (L7); {every.count('never')} of {len(every)} sets of five have none "
+        "either",
+    )
+
+
+def _fewest(sets: tuple[JointSet, ...]) -> list[JointSet]:
+    """The smallest sets that are never singular."""
+    never = [one for one in sets if one.singular == "never"]
+    return [one for one in never if len(one.joints) == min(len(each.joints) for each in never)]
 
 
 def _mobility_checks(sample: Sample) -> tuple[Check, ...]:
@@ -105,12 +145,9 @@ def _mobility_checks(sample: Sample) -> tuple[Check, ...]:
 
 
 def _jacobian_checks(sample: Sample) -> tuple[Check, ...]:
-    checks = [check_matrix(matrix, sample.robot, sample.phi) for matrix in (*CHUNG2008_FORWARD, *CHUNG2008_INVERSE)]
+    checks = [check_matrix(matrix, sample.robot, sample.phi) for matrix in ALL]
     for forward, inverse in zip(CHUNG2008_FORWARD, CHUNG2008_INVERSE, strict=True):
-        printed, corrected = (_not_inverse(forward, inverse, sample, corrected) for corrected in (False, True))
-        remark = f"{inverse.tag}; corrected, within {corrected:.0e}" if inverse.tag else ""
-        what = f"{inverse.equation} is the inverse of {forward.equation}"
-        checks.append(Check(what, "identity", f"within {printed:.1g}", printed < ROUNDING, remark))
+        checks.append(check_inverse(forward, inverse, sample.robot, sample.phi))
     by_vectors = _velocity_of_c(sample.lengths, sample.phi, sample.rates)
     matrices = np.stack([matrix(sample.phi, sample.lengths) for matrix in CHUNG2008_FORWARD], -3)
     off = float(np.abs(by_vectors - np.einsum("...ijk,...ik->...ij", matrices, sample.rates)).max())
@@ -147,27 +184,12 @@ def _body_checks(sample: Sample) -> tuple[Check, ...]:
     )
 
 
-def _entries(sample: Sample) -> Table:
-    rows = []
-    for matrix in (*CHUNG2008_FORWARD, *CHUNG2008_INVERSE):
-        found = compare(matrix, sample.robot, sample.phi)
-        kind = "forward" if matrix.forward else "inverse"
-        rows.append((matrix.equation, kind, found.as_printed, found.corrected, found.places, found.by, matrix.tag))
-    return Table(
-        "kinematics_matrices",
-        f"Printed Jacobians beside ours at {COUNT} random configurations; deviations as shares of the greatest entry, "
-        "and the greatest in the entry's own unit.",
-        ("equation", "kind", "as printed", "corrected", "wrong entry", "by up to", "erratum"),
-        rows,
-    )
-
-
 def _difference(sample: Sample) -> Difference:
     inverse = CHUNG2008_INVERSE[1]
     found = compare(inverse, sample.robot, sample.phi)
     printed = inverse(sample.phi, sample.lengths)
     broken = float(np.abs(printed[..., 0, :] + printed[..., 2, :] - [0.0, 0.0, 1.0]).max())
-    corrected = _not_inverse(CHUNG2008_FORWARD[1], inverse, sample, True)
+    corrected = off_inverse(CHUNG2008_FORWARD[1], inverse, sample.robot, sample.phi, corrected=True)
     return Difference(
         inverse.tag,
         "(16), row 1, column 3",
@@ -200,11 +222,6 @@ def _velocity_of_link_point(sample: Sample, number: int, point: tuple[Array, Arr
     pivot = sample.twist[:, :2] + omega[:, None] * np.array([-caster.y, caster.x])
     x, y = point[0] - caster.x, point[1] - caster.y
     return np.stack((pivot[:, 0] - yaw * y, pivot[:, 1] + yaw * x, 0.0 * yaw), -1)
-
-
-def _not_inverse(forward: Printed, inverse: Printed, sample: Sample, corrected: bool) -> float:
-    product = forward(sample.phi, sample.lengths) @ inverse(sample.phi, sample.lengths, corrected)
-    return float(np.abs(product - np.eye(3)).max())
 
 
 def _span(values: ArrayLike) -> str:

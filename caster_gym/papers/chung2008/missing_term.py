@@ -8,21 +8,27 @@ from numpy.typing import NDArray
 from caster_gym.analysis.driven_motion import DrivenMotion, inertial_force, lead
 from caster_gym.analysis.model_comparison import carried_mass, force_by_momenta, force_size, missing_force
 from caster_gym.engines.numpy_model import Model
-from caster_gym.papers.drawing import COLOURS, new_figure
-from caster_gym.papers.page import Check, Picture, Section, Table
+from caster_gym.papers.chung2008.missing_term_pictures import FORCE_AXES, Forces, picture_at_random, picture_on_circle
+from caster_gym.papers.page import Check, Difference, Section, Table
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse, Lemniscate, Shape
+from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
+ON_CIRCLE = ("chung2008", "xr4000")  # that are drawn
+SPEED = 1.0  # [m/s] greatest of C in every motion
+RADIUS = 1.0  # [m] of the circle of Figs. 8 and 9
 STATES = 10_000  # at random
 TIME_STEP = 0.01  # [s]
 SAID = (0.03, 0.06)  # what docs/equations.md says of it: typically, as a share of h
 DIGIT = 0.01  # the last one of that
 CLOSE = 1e-3  # [-] differences that decide are a thousand times smaller than what they decide about
+
+_OF_FORCES = ("exact", "as printed, without (D1)", "what is missing")
 
 
 class Shares(NamedTuple):
@@ -53,13 +59,14 @@ def section() -> Section:
     along = [_shares(robot, kind, led) for robot, kind, led in motions]
     residuals = [_residual(robot, kind, led[0]) for robot, kind, led in motions]
     at_random = {robot.name: random_shares(robot) for robot in robots}
-    ellipse = next(led[0] for robot, kind, led in motions if (robot.name, kind) == ("chung2008", "ellipse"))
+    on_circle = [_forces(robot, led[0]) for robot, kind, led in motions if kind == "circle" and robot.name in ON_CIRCLE]
     return Section(
         "The missing term",
-        _text(along, at_random),
+        _text(on_circle, along, at_random),
         (_size_check(at_random), *_steady_checks(robots, along), *_law_checks(along, residuals)),
-        (_table_along(along), _table_at_random(at_random), _table_of_residuals(residuals)),
-        (_picture_along(ellipse), _picture_at_random(at_random)),
+        (_table_on_circle(on_circle), _table_along(along), _table_at_random(at_random), _table_of_residuals(residuals)),
+        (picture_on_circle(on_circle, RADIUS, SPEED), picture_at_random(at_random, SAID)),
+        (_difference(residuals),),
     )
 
 
@@ -88,15 +95,35 @@ def steady_share(robot: Robot) -> float:
     return carried / (robot.platform.mass + carried)
 
 
+def circle(radius: float, speed: float) -> Circle:
+    """The circle of Figs. 8 and 9, with the same quintic (61), so that C has a greatest speed [m/s]."""
+    return Circle(radius=radius, duration=1.875 * 2.0 * np.pi * radius / speed, heading=Spinning())
+
+
+def at_speed(trajectory: Trajectory, speed: float) -> Trajectory:
+    """The same motion in another time, with a greatest speed [m/s] of C."""
+    faster = speed / float(np.hypot(*trajectory.samples[:, 4:6].T).max())
+    scale = np.repeat((1.0, faster, faster**2), (4, 3, 3))
+    return Trajectory(trajectory.name, trajectory.time_step / faster, trajectory.samples * scale)
+
+
 def _motions(robot: Robot) -> dict[str, list[DrivenMotion]]:
-    """The robot led along paths. How long a path takes does not matter: all forces go with the square of the speed."""
+    """The robot led along paths, each at the same greatest speed."""
     paths: dict[str, Shape | RandomPaths] = {
-        "circle": Circle(radius=1.0, duration=12.0, heading=Spinning()),
+        "circle": circle(RADIUS, SPEED),
         "ellipse": Ellipse(semi_axes=(3.0, 1.0), duration=30.0, heading=Spinning()),
         "lemniscate": Lemniscate(duration=12.0),
         "random paths": RandomPaths(count=6, max_speed=1.0, reversing=0.0),
     }
-    return {name: [lead(t, robot) for t in path.trajectories(TIME_STEP)] for name, path in paths.items()}
+    return {
+        name: [lead(at_speed(one, SPEED), robot) for one in path.trajectories(TIME_STEP)]
+        for name, path in paths.items()
+    }
+
+
+def _forces(robot: Robot, motion: DrivenMotion) -> Forces:
+    exact, printed = (inertial_force(motion, Model(robot, dynamics)) for dynamics in ("exact", "chung2008"))
+    return Forces(robot.name, motion.time, exact, printed)
 
 
 def _shares(robot: Robot, kind: str, motions: list[DrivenMotion]) -> Shares:
@@ -122,11 +149,12 @@ def _residual(robot: Robot, kind: str, motion: DrivenMotion) -> Residual:
 def _size_check(at_random: dict[str, tuple[Array, Array]]) -> Check:
     low, middle, high = np.percentile(at_random["chung2008"][0], (25.0, 50.0, 75.0))
     return Check(
-        "our own statement: at any steering, the missing term as a share of h",
+        "at any steering, the missing term as a share of h",
         f"typically {SAID[0]:.0%} to {SAID[1]:.0%}",
         f"half of all states from {low:.1%} to {high:.1%}, median {middle:.1%}",
         max(abs(low - SAID[0]), abs(high - SAID[1])) < 0.5 * DIGIT,
         "E3; chung2008's robot, |ν| = 1 in SI units",
+        own=True,
     )
 
 
@@ -134,11 +162,12 @@ def _steady_checks(robots: tuple[Robot, ...], along: list[Shares]) -> tuple[Chec
     measured = {s.robot: float(np.median(s.of_bias)) for s in along if s.motion == "circle"}
     return tuple(
         Check(
-            f"{robot.name} on a circle, casters trailing: share of h by (F5), and along the motion",
+            f"{robot.name} on a circle, casters trailing: share of h, by (F5) and along the motion",
             f"{steady_share(robot):.4%}",
             f"{measured[robot.name]:.4%}",
             abs(measured[robot.name] - steady_share(robot)) < CLOSE * steady_share(robot),
             "Σ m_l p / d over itself and the platform's mass",
+            own=True,
         )
         for robot in robots
     )
@@ -158,23 +187,38 @@ def _law_checks(along: list[Shares], residuals: list[Residual]) -> tuple[Check, 
         ),
         Check(
             "the force with (D1) is what these laws ask for, all robots and motions",
-            "—",
+            f"off by less than {CLOSE:g} of what it is without",
             f"at least {min(r.printed / r.exact for r in residuals):.0f} times closer than without, off by at most "
             f"{max(r.exact / r.force for r in residuals):.1e} of the greatest force",
             all(r.exact < CLOSE * r.printed for r in residuals),
             "what is left is the numerical derivative",
+            own=True,
         ),
         Check(
             "power of the missing term, all robots and motions",
-            "—",
+            "0",
             f"at most {power:.1e} of size times speed",
             power < 1e-9,
             "so neither kinetic energy nor work, as in Fig. 7, can show that it is missing",
+            own=True,
         ),
     )
 
 
-def _text(along: list[Shares], at_random: dict[str, tuple[Array, Array]]) -> str:
+def _difference(residuals: list[Residual]) -> Difference:
+    own = [r for r in residuals if r.robot == "chung2008"]
+    return Difference(
+        "E3",
+        "after (43)",
+        "P*_φφφ becomes a zero array",
+        "off-axis term (D1)",
+        "momenta of all bodies, differentiated along the motions: the printed model's force is off by up to "
+        f"{max(r.printed / r.force for r in own):.1%} of the greatest force, the exact one's by "
+        f"{max(r.exact / r.force for r in own):.0e}",
+    )
+
+
+def _text(on_circle: list[Forces], along: list[Shares], at_random: dict[str, tuple[Array, Array]]) -> str:
     worst = max(along, key=lambda s: s.root_mean_square)
     least = min(along, key=lambda s: s.root_mean_square)
     medians = ", ".join(f"{np.median(at_random[name][0]):.1%} ({name})" for name in ROBOTS)
@@ -184,12 +228,27 @@ velocity terms remain. That holds for coordinates that tell where the robot is; 
 What is missing is (D1) of docs/equations.md, and (F5) gives it a plain meaning: each caster carries a mass m_l p / d at
 its pivot that feels η̇ ẑ × v of the pivot, across its motion and so without power.
 
+On the circle of Figs. 8 and 9, driven with a greatest speed of {SPEED:g} m/s, casters trail steadily and the term is
+felt across the path alone: the greatest force in x falls short by
+{" and by ".join(f"{np.abs(one.missing[:, 0]).max():.2g} N on {one.robot}" for one in on_circle)}.
+
 Here both models are put beside the force that follows from the momenta of all bodies, differentiated numerically along
-the motion (F6). Along the motions below the term is between {least.root_mean_square:.1%} ({least.robot},
-{least.motion}) and {worst.root_mean_square:.1%} ({worst.robot}, {worst.motion}) of the force, as root mean squares. As
-a share of h at random steering angles its median is {medians}: small for the light links of the paper's robot, and not
-for the forks of a real one.
+the motion (F6). Along the motions below, each with a greatest speed of {SPEED:g} m/s, the term is between
+{least.root_mean_square:.1%} ({least.robot}, {least.motion}) and {worst.root_mean_square:.1%}
+({worst.robot}, {worst.motion}) of the force, as root mean squares. As a share of h at random steering angles its median
+is {medians}: small for the light links of the paper's robot, and not for the forks of a real one.
 """
+
+
+def _table_on_circle(on_circle: list[Forces]) -> Table:
+    rows: list[tuple[str | float, ...]] = [
+        (one.robot, what, SPEED, float(one.time[-1]), *(float(peak) for peak in np.abs(force).max(axis=0)))
+        for one in on_circle
+        for what, force in zip(_OF_FORCES, (one.exact, one.printed, one.missing), strict=True)
+    ]
+    columns = ("robot", "model", "greatest speed [m/s]", "time [s]", *FORCE_AXES)
+    caption = f"Greatest operational forces on the circle of {RADIUS:g} m, greatest speed {SPEED:g} m/s, body frame"
+    return Table("missing_circle", caption, columns, rows)
 
 
 def _table_along(along: list[Shares]) -> Table:
@@ -197,14 +256,27 @@ def _table_along(along: list[Shares]) -> Table:
         (
             s.robot,
             s.motion,
+            SPEED,
             s.root_mean_square,
             *(float(v) for v in np.percentile(s.of_force, (50.0, 95.0))),
             *(float(v) for v in np.percentile(s.of_bias, (50.0, 95.0))),
         )
         for s in along
     ]
-    columns = ("robot", "motion", "rms / rms of F", "median of F", "95 % of F", "median of h", "95 % of h")
-    caption = "Size of the missing term as a share of the force F = M ν̇ + h and of h, moments over the pivots' distance"
+    columns = (
+        "robot",
+        "motion",
+        "greatest speed [m/s]",
+        "rms / rms of F",
+        "median of F",
+        "95 % of F",
+        "median of h",
+        "95 % of h",
+    )
+    caption = (
+        "Size of the missing term as a share of the force F = M ν̇ + h and of h, moments over the pivots' distance, "
+        f"greatest speed {SPEED:g} m/s"
+    )
     return Table("missing_along", caption, columns, rows)
 
 
@@ -220,45 +292,8 @@ def _table_at_random(at_random: dict[str, tuple[Array, Array]]) -> Table:
 
 def _table_of_residuals(residuals: list[Residual]) -> Table:
     columns = ("robot", "motion", "greatest force [N]", "exact model off by [N]", "printed model off by [N]")
-    caption = "Distance of both models from the force that the momenta of all bodies ask for"
+    caption = (
+        "Distance of both models from the force that the momenta of all bodies ask for, greatest speed of each motion "
+        f"{SPEED:g} m/s"
+    )
     return Table("missing_residuals", caption, columns, residuals)
-
-
-def _picture_along(motion: DrivenMotion) -> Picture:
-    robot = load_robot("chung2008")
-    missing, force = missing_force(robot, motion.steering, motion.twist), inertial_force(motion, Model(robot))
-    figure = new_figure(1, 2, size=(5.2, 3.3))
-    parts, share = figure.axes
-    lines = (("F_x [N]", 1.0, "-", 0), ("F_y [N]", 1.0, "--", 3), ("100 M_z [N m]", 100.0, "-.", 4))
-    for k, (label, scale, style, colour) in enumerate(lines):
-        parts.plot(motion.time, scale * missing[:, k], style, color=COLOURS[colour], label=label)
-    parts.set(xlabel="time [s]", ylabel="missing force")
-    parts.legend(fontsize=8)
-    inner = slice(1, -1)
-    ratio = force_size(robot, missing[inner]) / force_size(robot, force[inner])
-    share.plot(motion.time[inner], 100.0 * ratio, color=COLOURS[0])
-    share.set(xlabel="time [s]", ylabel="missing / force [%]", ylim=(0.0, None))
-    caption = (
-        "The missing term of chung2008's robot on the ellipse of 3 m by 1 m in 30 s: its components in the body frame, "
-        "and its size as a share of the force. It grows with the square of the speed, so it is largest in mid-course."
-    )
-    return Picture("missing_along", caption, figure)
-
-
-def _picture_at_random(at_random: dict[str, tuple[Array, Array]]) -> Picture:
-    figure = new_figure(1, 2, size=(5.2, 3.3), sharey=True)
-    levels = np.linspace(0.0, 100.0, STATES)
-    for axis, k, what in zip(figure.axes, (0, 1), ("h", "F"), strict=True):
-        for (name, shares), colour, style in zip(
-            at_random.items(), (COLOURS[0], COLOURS[3], COLOURS[4]), ("-", "--", "-."), strict=True
-        ):
-            axis.semilogx(100.0 * np.sort(shares[k]), levels, style, color=colour, label=name)
-        axis.set(xlabel=f"missing term / {what} [%]", xlim=(0.2, 200.0))
-    figure.axes[0].axvspan(100.0 * SAID[0], 100.0 * SAID[1], color=COLOURS[1], alpha=0.2, label="3 to 6 %")
-    figure.axes[0].set_ylabel("states below [%]")
-    figure.axes[0].legend(fontsize=8, loc="upper left")
-    caption = (
-        f"Share of the missing term in h and in the force at {STATES} random states with |ν| = |ν̇| = 1: half of "
-        "all states of chung2008's robot lie in the band."
-    )
-    return Picture("missing_at_random", caption, figure)

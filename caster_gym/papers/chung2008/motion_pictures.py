@@ -53,7 +53,7 @@ def draw_path(motion: DrivenMotion, robot: Robot) -> Picture:
         "Fig. 5: the path of C with the body axes at eight moments, the heading (61), and the robot as it is led: the "
         "casters trail behind the motion along y (arrow)."
     )
-    return Picture("fig5", caption, figure)
+    return Picture("fig5", "Path, heading and casters, Fig. 5", caption, figure)
 
 
 def draw_joints(motion: DrivenMotion, robot: Robot) -> Picture:
@@ -85,7 +85,7 @@ def draw_joints(motion: DrivenMotion, robot: Robot) -> Picture:
         "Fig. 6: joints on the circle, in the paper's signs (trailing wheels roll at a negative rate). The casters "
         "keep their steering angles, so all of them yaw at the platform's rate."
     )
-    return Picture("fig6", caption, figure)
+    return Picture("fig6", "Joints on the circle, Fig. 6", caption, figure)
 
 
 def draw_energy(motion: DrivenMotion, robot: Robot) -> Picture:
@@ -100,7 +100,8 @@ def draw_energy(motion: DrivenMotion, robot: Robot) -> Picture:
         axis.plot(motion.time, energy * 1e3, style, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="kinetic energy [mJ]")
     axis.legend()
-    return Picture("fig7", "Fig. 7: kinetic energy along the circle, with and without wheels.", figure)
+    caption = "Fig. 7: kinetic energy along the circle, with and without wheels."
+    return Picture("fig7", "Kinetic energy, Fig. 7", caption, figure)
 
 
 def draw_forces(motion: DrivenMotion, lines: Sequence[tuple[str, Array]]) -> Picture:
@@ -116,4 +117,4 @@ def draw_forces(motion: DrivenMotion, lines: Sequence[tuple[str, Array]]) -> Pic
         "Figs. 8 and 9: operational forces and moment along the circle, in the body frame. Wheels are felt along the "
         "path (F_y) and in turning (M_z), and hardly across it (F_x)."
     )
-    return Picture("fig8_9", caption, figure)
+    return Picture("fig8_9", "Operational forces, Figs. 8 and 9", caption, figure)

@@ -118,12 +118,14 @@ def section() -> Section:
         (
             _picture(
                 "fig10_12",
+                "Operational forces on the circle by wheel mass, Figs. 10 to 12",
                 "Figs. 10 to 12: operational forces along the circle of 5 m, platform of 5 kg, body frame. Heavier "
                 "wheels are felt along the path (F_y) and in turning (M_z); in F_x all curves lie upon each other.",
                 results["circle"],
             ),
             _picture(
                 "fig13_15",
+                "Operational forces on the ellipse by wheel mass, Figs. 13 to 15",
                 "Figs. 13 to 15: operational forces along the ellipse of 3 m by 1 m, platform of 20 kg, body frame. "
                 "The heading turns at the rate of the eccentric anomaly, so that the casters do not keep their angles "
                 "and heavier wheels are felt in all three directions.",
@@ -246,7 +248,7 @@ def _table(cases: dict[str, Case], results: dict[str, Result]) -> Table:
     return Table("wheel_mass", "Greatest operational forces, body frame", columns, rows)
 
 
-def _picture(name: str, caption: str, result: Result) -> Picture:
+def _picture(name: str, title: str, caption: str, result: Result) -> Picture:
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -259,4 +261,4 @@ def _picture(name: str, caption: str, result: Result) -> Picture:
             axis.plot(result.time, force[:, k], color=colours(scale(mass)), linewidth=1.1)
         axis.set(xlabel="time [s]", ylabel=_LABELS[k])
     figure.colorbar(ScalarMappable(scale, colours), ax=figure.axes, label="three wheels together [kg]", pad=0.01)
-    return Picture(name, caption, figure)
+    return Picture(name, title, caption, figure)

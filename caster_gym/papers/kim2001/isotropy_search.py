@@ -133,14 +133,15 @@ def cell_checks(table: int, sets: Sequence[tuple[str, ...]]) -> list[Check]:
     checks, cells = [], printed_cells(table)
     for cell, ours in zip(cells, at_printed(cells), strict=True):
         best, number = optimum(cell.place, sets), check_number("", cell.sigma, float(ours))
+        found = is_printed(best, cell)
         what = f"Table {table}, φ̇_max/θ̇_max = {cell.rate_ratio:g}, ω_max/v_max = {cell.twist_ratio:g}/a"
         checks.append(
             Check(
                 f"{what}: best set and [r, d] / a, index",
                 f"{design(cell.joints, cell.r, cell.d)} {cell.sigma}",
                 f"{design(best.joints, best.r, best.d)} {number.ours}",
-                is_printed(best, cell) and number.agrees,
-                "" if number.agrees else "E9: the best design agrees, its index does not",
+                found and number.agrees,
+                "E9: the best design agrees, its index does not" if found and not number.agrees else "",
             )
         )
     return checks

@@ -151,7 +151,12 @@ def _picture(one: Classified) -> Picture:
         "symmetry (×: sets of the type). The left cell at a pivot is the rolling joint, the right one the steering "
         "joint, filled if driven."
     )
-    return Picture(f"joint_sets_{one.robot.name}", caption, joint_set_lattice(one.robot, one.sets))
+    return Picture(
+        f"joint_sets_{one.robot.name}",
+        f"Types of joint sets of {one.robot.name}",
+        caption,
+        joint_set_lattice(one.robot, one.sets),
+    )
 
 
 def _somewhere(what: str, robot: Robot, sets: Sequence[JointSet], remark: str) -> Check:

@@ -6,18 +6,23 @@ import numpy as np
 
 from caster_gym.engines.numpy_model import Model
 from caster_gym.papers.drawing import COLOURS, draw_robot, new_figure
+from caster_gym.papers.jacobian_checks import (
+    ROUNDING,
+    check_inverse,
+    check_matrix,
+    compare,
+    comparison_table,
+    off_inverse,
+)
 from caster_gym.papers.notation import CHUNG2008, KIM2001, Array, Lengths, Notation, kim2001_robot, lengths_of
-from caster_gym.papers.page import Check, Difference, Picture, Section, Table, check_number
+from caster_gym.papers.page import Check, Difference, Picture, Section, check_number
 from caster_gym.papers.printed_jacobians import (
     KIM2001_FORWARD,
     KIM2001_FOUR,
     KIM2001_GENERAL,
     KIM2001_INVERSE,
     KIM2001_THREE,
-    ROUNDING,
     Printed,
-    check_matrix,
-    compare,
 )
 
 if TYPE_CHECKING:
@@ -82,7 +87,7 @@ def section() -> Section:
         "Kinematics (section II)",
         text,
         checks=(*_vector_checks(sample), *_matrix_checks(sample), *_table_2_checks()),
-        tables=(_entries(sample),),
+        tables=(comparison_table(ALL, sample.robot, sample.phi),),
         pictures=(_convention_picture(),),
         differences=_differences(sample, four.places),
     )
@@ -103,10 +108,7 @@ def _matrix_checks(sample: Sample) -> tuple[Check, ...]:
     checks = [check_matrix(matrix, sample.robot, sample.phi) for matrix in ALL]
     pairs = (*zip(KIM2001_GENERAL[:3], KIM2001_GENERAL[3:], strict=True), *_pairs())
     for forward, inverse in pairs:
-        printed, corrected = (_not_inverse(forward, inverse, sample, mend) for mend in (False, True))
-        remark = f"{inverse.tag}; corrected, within {corrected:.0e}" if inverse.tag else ""
-        what = f"{inverse.equation} is the inverse of {forward.equation}"
-        checks.append(Check(what, "identity", f"within {printed:.1g}", printed < ROUNDING, remark))
+        checks.append(check_inverse(forward, inverse, sample.robot, sample.phi))
     determinants = [np.linalg.det(matrix(sample.phi, sample.lengths)) for matrix in KIM2001_FORWARD]
     off = float(np.abs(np.stack(determinants) + sample.lengths.d * sample.lengths.r).max())
     ours = f"−d r within {off:.0e} a²; + d r in chung2008, whose θ̇ has the opposite sign"
@@ -128,7 +130,7 @@ def _table_2_checks() -> tuple[Check, ...]:
             cell.printed,
             global_index(cell, corrected=True),
             remark=f"by the rows of (37) as printed {global_index(cell, corrected=False):.4f}",
-        )
+        )._replace(own=True)  # the section on four joints has the numbers themselves
         for cell in CELLS
     )
 
@@ -146,26 +148,11 @@ def global_index(cell: Cell, corrected: bool) -> float:
     return float((values[:, -1] / values[:, 0]).mean())
 
 
-def _entries(sample: Sample) -> Table:
-    rows = []
-    for matrix in ALL:
-        found = compare(matrix, sample.robot, sample.phi)
-        kind = "forward" if matrix.forward else "inverse"
-        rows.append((matrix.equation, kind, found.as_printed, found.corrected, found.places, found.by, matrix.tag))
-    return Table(
-        "kinematics_matrices",
-        f"Printed Jacobians beside ours at {COUNT} random configurations; deviations as shares of the greatest entry, "
-        "and the greatest in the entry's own unit.",
-        ("equation", "kind", "as printed", "corrected", "wrong entries", "by up to", "erratum"),
-        rows,
-    )
-
-
 def _differences(sample: Sample, rows_of_37: str) -> tuple[Difference, ...]:
     third = compare(KIM2001_INVERSE[2], sample.robot, sample.phi)
     printed = KIM2001_INVERSE[2](sample.phi, sample.lengths)
     broken = float(np.abs(printed[:, 0] + printed[:, 2] - [0.0, 0.0, 1.0]).max())
-    mended = _not_inverse(KIM2001_FORWARD[2], KIM2001_INVERSE[2], sample, True)
+    mended = off_inverse(KIM2001_FORWARD[2], KIM2001_INVERSE[2], sample.robot, sample.phi, corrected=True)
     three = compare(KIM2001_THREE, sample.robot, sample.phi)
     four = KIM2001_FOUR(sample.phi, sample.lengths)
     passive = KIM2001.inverse_jacobian(sample.robot, sample.phi)[:, :2, :2].reshape(COUNT, 4, 3)
@@ -222,11 +209,6 @@ def _pairs() -> tuple[tuple[Printed, Printed], ...]:
     return tuple(zip(KIM2001_FORWARD, KIM2001_INVERSE, strict=True))
 
 
-def _not_inverse(forward: Printed, inverse: Printed, sample: Sample, corrected: bool) -> float:
-    product = forward(sample.phi, sample.lengths) @ inverse(sample.phi, sample.lengths, corrected)
-    return float(np.abs(product - np.eye(3)).max())
-
-
 def _convention_picture() -> Picture:
     delta = 0.6
     figure = new_figure(columns=3, size=(3.6, 3.9))
@@ -240,7 +222,7 @@ def _convention_picture() -> Picture:
         "the wheel along the blue arrow: as the black one here and in kim2001, against it in chung2008. In both papers "
         "φ counts clockwise, in the opposite sense to δ."
     )
-    return Picture("kinematics_conventions", caption, figure)
+    return Picture("kinematics_conventions", "How three notations count angles", caption, figure)
 
 
 def _draw_convention(axis: "Axes", notation: Notation, delta: float) -> None:

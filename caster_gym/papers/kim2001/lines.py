@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.analysis.joint_sets import turned_parallel, turned_towards
-from caster_gym.analysis.singular_lines import action_lines, meeting, smallest_singular_value
+from caster_gym.analysis.singular_lines import MEETS, action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
 from caster_gym.papers.drawing import COLOURS, new_figure
 from caster_gym.papers.notation import kim2001_robot
@@ -29,6 +29,7 @@ class Comparison(NamedTuple):
     """Geometry beside singular values: one entry a configuration."""
 
     gap: Array  # [-] how far the lines are from meeting
+    met: Array  # 1 where the geometry alone says that they meet or are parallel, else 0
     singular_value: Array  # [-] least, of the Jacobian's rows as unit lines
     joints: Array  # their number
 
@@ -63,16 +64,36 @@ def compare_singular(seed: int = 1, robots: int = ROBOTS, away: bool = False) ->
 
 
 def singular_configurations(rng: np.random.Generator, count: int) -> Iterator[tuple[Robot, tuple[str, ...], Array]]:
-    """Robots, joints and angles at which all lines meet in a point, at 3 to 1,000 m, or are parallel, by turns."""
+    """Robots, joints and angles where all lines meet in a point, are parallel, or meet in a wheel's centre, by turns.
+
+    The point is at 3 to 1,000 m. In the last case the caster of that wheel has both joints driven, and others, one at
+    least, have one; in the first two, three casters or more have one.
+    """
     for k in range(count):
         robot = _random_robot(rng, fewest=3)
-        joints = tuple(f"{rng.choice(['roll', 'steer'])}_{i}" for i in range(1, robot.caster_count + 1))
-        way = rng.uniform(-np.pi, np.pi)
-        if k % 2 == 0:
-            point = 10.0 ** rng.uniform(0.5, 3.0) * np.array([np.cos(way), np.sin(way)])
+        way, numbers = rng.uniform(-np.pi, np.pi), rng.permutation(robot.caster_count) + 1
+        unit = np.array([np.cos(way), np.sin(way)])
+        if k % 3 == 2:
+            both, *others = numbers[: rng.integers(2, robot.caster_count + 1)]
+            caster = robot.casters[both - 1]
+            point = np.array([caster.x, caster.y]) + np.hypot(caster.trail, caster.offset) * unit
+            named = [f"roll_{both}", f"steer_{both}", *(_joint_towards(rng, robot, i, point) for i in others)]
+            yield robot, tuple(named), np.array(turned_towards(robot, named, point))
+            continue
+        some = numbers[: rng.integers(3, robot.caster_count + 1)]
+        joints = tuple(f"{rng.choice(['roll', 'steer'])}_{i}" for i in some)
+        if k % 3 == 0:
+            point = 10.0 ** rng.uniform(0.5, 3.0) * unit
             yield robot, joints, np.array(turned_towards(robot, joints, point))
         else:
             yield robot, joints, np.array(turned_parallel(robot, joints, way))
+
+
+def _joint_towards(rng: np.random.Generator, robot: Robot, number: int, point: Array) -> str:
+    """A joint of a caster whose line can pass through a point; steering only where its axle reaches it."""
+    caster = robot.casters[number - 1]
+    near = np.hypot(point[0] - caster.x, point[1] - caster.y) < caster.trail
+    return f"roll_{number}" if near else f"{rng.choice(['roll', 'steer'])}_{number}"
 
 
 def section() -> Section:
@@ -82,7 +103,7 @@ def section() -> Section:
         "Singularities: lines that meet, on any robot",
         _text(random, exact, near),
         _checks(random, exact),
-        pictures=(Picture("singularity_lines", _CAPTION, _figure(random, near)),),
+        pictures=(Picture("singularity_lines", "Gap and singular value", _CAPTION, _figure(random, near)),),
     )
 
 
@@ -107,9 +128,10 @@ infinity, and the *gap* is how far the other lines pass it by: the fastest of th
 The gap bounds the smallest singular value σ of the Jacobian's rows, taken as unit lines, from both sides,
 gap/√3 ≤ σ ≤ √(J − 2) gap for J joints (L4). Over {random.gap.size:,} random configurations of {ROBOTS} random robots
 with 2 to 5 casters, σ √3/gap is {low:.3f} or more, σ/(√(J − 2) gap) is {high:.4f} or less, and the least gap is
-{random.gap.min():.1e}. Over {exact.gap.size} configurations made singular by geometry the largest gap is
-{exact.gap.max():.0e} and the largest σ {exact.singular_value.max():.0e}. The picture goes from the one to the other,
-with {near.gap.size:,} configurations more.
+{random.gap.min():.1e}. Over {exact.gap.size} configurations made singular by geometry (lines that meet far away, are
+parallel, or meet in the centre of a wheel with both joints driven) the largest gap is {exact.gap.max():.0e} and the
+largest σ {exact.singular_value.max():.0e}. The picture goes from the one to the other, with {near.gap.size:,}
+configurations more.
 
 This is about joints. A gear that couples the two motors of a caster makes one motor push along another line through
 the wheel's centre, so that the statement then covers casters with both motors driven, or none.
@@ -118,20 +140,23 @@ the wheel's centre, so that the statement then covers casters with both motors d
 
 def _checks(random: Comparison, exact: Comparison) -> tuple[Check, ...]:
     low, high = random.bounds
-    bounded = low >= 1.0 - ROUNDING and high <= 1.0 + ROUNDING and float(random.gap.min()) > 0.0
-    largest = float(exact.singular_value.max())
+    bounded = low >= 1.0 - ROUNDING and high <= 1.0 + ROUNDING
+    largest, widest = float(exact.singular_value.max()), float(exact.gap.max())
     return (
         Check(
             f"lines that neither meet nor are parallel: {random.gap.size:,} random configurations",
             "not singular",
-            f"σ ≥ {low / np.sqrt(3.0):.3f} gap, least σ {random.singular_value.min():.1e}",
-            bounded,
+            f"least gap {random.gap.min():.1e}, σ ≥ {low / np.sqrt(3.0):.3f} gap, least σ "
+            f"{random.singular_value.min():.1e}",
+            bounded and not random.met.any(),
+            f"lines are taken to meet up to a gap of {MEETS:g}",
         ),
         Check(
             f"lines that meet or are parallel: {exact.gap.size} configurations made so",
             "singular",
-            f"σ ≤ {largest:.0e}",
-            largest < ROUNDING,
+            f"{exact.met.sum():.0f} seen as such, gap ≤ {widest:.0e}; σ ≤ {largest:.0e}",
+            bool(exact.met.all()) and max(largest, widest) < ROUNDING,
+            "a third of them in the centre of a wheel with both joints driven; on some casters no joint is driven",
         ),
     )
 
@@ -165,6 +190,12 @@ def _random_robot(rng: np.random.Generator, fewest: int) -> Robot:
     return robot.model_copy(update={"casters": casters})
 
 
-def _compared(robot: Robot, steering: Array, joints: Sequence[str]) -> tuple[Array, Array, Array]:
-    gap = meeting(action_lines(robot, steering, joints), Model(robot).characteristic_length).gap
-    return gap, smallest_singular_value(robot, steering, joints), np.full(len(gap), float(len(joints)))
+def _compared(robot: Robot, steering: Array, joints: Sequence[str]) -> tuple[Array, Array, Array, Array]:
+    met = meeting(action_lines(robot, steering, joints), Model(robot).characteristic_length)
+    gap = met.gap
+    return (
+        gap,
+        met.singular.astype(np.float64),
+        smallest_singular_value(robot, steering, joints),
+        np.full(len(steering), float(len(joints))),
+    )

@@ -53,6 +53,13 @@ one point, and there the set is singular (E10): the index is {zero:.0e} at most.
             *cell_checks(2, (FOUR,)),
             check_number(f"V: σ_GI of (θ_1, φ_1, θ_2, φ_2), {FIGURES}", "0.577", float(greatest[2, 1])),
             Check(
+                "V: operation conditions of the 0.577",
+                "φ̇_max/θ̇_max = a, ω_max/v_max = 0.5a",
+                f"φ̇_max/θ̇_max = 1, ω_max/v_max = 0.5/a, where the index is {greatest[2, 1]:.4f}",
+                False,
+                "E28: a quotient of two rates has no unit, and ω/v is one over a length",
+            ),
+            Check(
                 "V: four joints are better than three",
                 "as expected",
                 f"for {(improvement > 1.0).sum()} of 25 demands",
@@ -69,11 +76,30 @@ one point, and there the set is singular (E10): the index is {zero:.0e} at most.
         (
             Picture(
                 "figure_6",
+                "Index of four joints over two steering angles, Fig. 6",
                 f"Fig. 6: index of (θ_1, φ_1, θ_2, φ_2) at {FIGURES}: {local.min():.3f} to {local.max():.3f}, nowhere "
                 "singular. The nearer to C the middle between the two wheels' centres is, the higher it is.",
                 contours(FOUR, 0.005),
             ),
         ),
+        (_conditions(),),
+    )
+
+
+def _conditions() -> Difference:
+    """Which conditions give the 0.577 for every size a of the robot."""
+    sizes = (1.0, 2.0)  # [m] of a
+    right, printed = (
+        ", ".join(f"{float(indices(FOUR, 0.1, 0.1, rate(a), twist(a))):.3f}" for a in sizes)
+        for rate, twist in ((lambda a: 1.0, lambda a: 0.5), (lambda a: a, lambda a: 0.5 * a * a))
+    )
+    return Difference(
+        "E28",
+        "V, on Fig. 6",
+        "φ̇_max/θ̇_max = a, ω_max/v_max = 0.5a",
+        "φ̇_max/θ̇_max = 1, ω_max/v_max = 0.5/a",
+        f"a is a length, and the index must not depend on its unit: for a = {' and '.join(f'{a:g} m' for a in sizes)} "
+        f"it is {right} with the corrected conditions at r = d = 0.1a, and {printed} with the printed ones",
     )
 
 
@@ -118,6 +144,7 @@ some of them at the ends of the grid: {"; ".join(others)}.
         (
             Picture(
                 "six_joints",
+                "Mean index of six joints by r/d",
                 "Mean index of all six joints against r/d for φ̇_max = θ̇_max. Left: with short steering links it is "
                 "greatest at 1 for every demand. Right: for ω_max/v_max = 0.1/a its maximum (dots) rises with d and "
                 "moves below 1.",

@@ -45,9 +45,9 @@ def section() -> Section:
         _TEXT,
         (*_determinant_checks(phi), *_figure_checks()),
         pictures=(
-            Picture("singularity_figure_2", f"Fig. 2, (θ_1, θ_2, φ_3): {_MEET} {LEGEND}", _figure_of(_figure_2())),
-            Picture("singularity_figure_3", f"Fig. 3, (θ_1, φ_2, θ_3), drawn alike: {_MEET}", _figure_of(_figure_3())),
-            Picture("singularity_figure_4", f"Fig. 4, four joints, drawn alike. {_WHEEL_1}", _figure_of(_figure_4())),
+            _picture(2, f"(θ_1, θ_2, φ_3): {_MEET} {LEGEND}", _figure_2()),
+            _picture(3, f"(θ_1, φ_2, θ_3), drawn alike: {_MEET}", _figure_3()),
+            _picture(4, f"four joints, drawn alike. {_WHEEL_1}", _figure_4()),
         ),
         differences=_differences(phi),
     )
@@ -76,8 +76,8 @@ _WHEEL_1 = (
 def _determinant_checks(phi: Array) -> tuple[Check, ...]:
     return (
         _zero("(27) as printed, from the determinant of our Jacobian", _off(phi, corrected=False), "E6"),
-        _zero("(27) with sin(φ_1 − φ_2), from the same", _off(phi, corrected=True)),
-        _zero("(27) so corrected, from 0 where the three lines meet or are parallel", _worst(_on_lines())),
+        _zero("(27) with sin(φ_1 − φ_2), from the same", _off(phi, corrected=True), own=True),
+        _zero("(27) so corrected, from 0 where the three lines meet or are parallel", _worst(_on_lines()), own=True),
     )
 
 
@@ -156,6 +156,11 @@ def _figure_4() -> list[Configuration]:
     return [(in_words(letters), turned_towards(ROBOT, in_words(letters), wheel)) for letters in FOUR_JOINTS]
 
 
+def _picture(number: int, what: str, configurations: Sequence[Configuration]) -> Picture:
+    title = f"Lines that meet or are parallel, Fig. {number}"
+    return Picture(f"singularity_figure_{number}", title, f"Fig. {number}, {what}", _figure_of(configurations))
+
+
 def _figure_of(configurations: Sequence[Configuration]) -> "Figure":
     figure = new_figure(len(configurations) // 2, 2, size=(4.4, 4.9))
     for axis, (joints, steering) in zip(figure.axes, configurations, strict=True):
@@ -167,8 +172,8 @@ def _figure_of(configurations: Sequence[Configuration]) -> "Figure":
     return figure
 
 
-def _zero(what: str, error: float, remark: str = "") -> Check:
-    return Check(what, "no difference", f"{error:.1e}", error < ROUNDING, remark)
+def _zero(what: str, error: float, remark: str = "", own: bool = False) -> Check:
+    return Check(what, "no difference", f"{error:.1e}", error < ROUNDING, remark, own)
 
 
 def _off(phi: Array, corrected: bool) -> float:

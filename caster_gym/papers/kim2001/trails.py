@@ -40,8 +40,13 @@ def section() -> Section:
         tuple(_check(*optimum) for optimum in optima),
         (_table(optima),),
         (
-            Picture("joint_sets_trail", _TRAIL_CAPTION, _trail_figure(optima)),
-            Picture("joint_sets_three_motors", _THREE_CAPTION, _three_motors_figure(unequal, three)),
+            Picture("joint_sets_trail", "Long trails are singular", _TRAIL_CAPTION, _trail_figure(optima)),
+            Picture(
+                "joint_sets_three_motors",
+                "Three motors that suffice",
+                _THREE_CAPTION,
+                _three_motors_figure(unequal, three),
+            ),
         ),
         _differences(optima),
     )
