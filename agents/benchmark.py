@@ -23,10 +23,10 @@ from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
 from .settings import (
+    AgentSettings,
     BenchmarkSettings,
     ComputedTorqueSettings,
-    PPOSettings,
-    SACSettings,
+    LearnedSettings,
     TaskSettings,
     read_agent,
     read_settings,
@@ -41,7 +41,7 @@ class Job(NamedTuple):
 
     name: str
     task: TaskSettings
-    agent: PPOSettings | SACSettings
+    agent: LearnedSettings
     seed: int
     folder: Path
 
@@ -51,7 +51,7 @@ class Comparison(NamedTuple):
 
     settings: BenchmarkSettings
     task: TaskSettings
-    agents: dict[str, PPOSettings | SACSettings | ComputedTorqueSettings]  # by the stems of their files
+    agents: dict[str, AgentSettings]  # by the stems of their files
 
 
 class Contender(NamedTuple):
@@ -64,7 +64,7 @@ class Contender(NamedTuple):
 
 def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | None = None) -> Comparison:
     """Read all files that a comparison names. changes: fields of learned agents to set, such as {"steps": 10000}."""
-    agents: dict[str, PPOSettings | SACSettings | ComputedTorqueSettings] = {}
+    agents: dict[str, AgentSettings] = {}
     for name in settings.agents:
         stem = Path(name).stem
         if stem in agents:

@@ -5,7 +5,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
@@ -106,10 +115,9 @@ class Learner(Frozen):
     validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
 
 
-class PPOSettings(Learner):
-    """Proximal policy optimisation (Schulman et al., 2017), by Stable-Baselines3."""
+class OnPolicy(Learner):
+    """Proximal policy optimisation (Schulman et al., 2017), whoever computes it."""
 
-    algorithm: Literal["ppo"]
     steps: PositiveInt = 2_000_000  # control periods of all robots together
     learning_rate: PositiveFloat = 7e-4
     robots: PositiveInt = 128
@@ -127,6 +135,57 @@ class PPOSettings(Learner):
             raise ValueError(
                 f"a batch of {self.batch} needs at most robots · horizon = {self.robots * self.horizon} steps"
             )
+        return self
+
+
+class PPOSettings(OnPolicy):
+    """Proximal policy optimisation by Stable-Baselines3, on NumPy arrays."""
+
+    algorithm: Literal["ppo"]
+
+
+class OnTensors(Frozen):
+    """Where robots and learner live together, when observations and rewards stay Torch tensors."""
+
+    device: str = "cpu"  # or cuda, cuda:1, …
+    compile: bool = False  # fuse the robots' step into few kernels; its first call then takes minutes
+
+
+class RslPPOSettings(OnPolicy, OnTensors):
+    """Proximal policy optimisation by rsl-rl-lib, on tensors."""
+
+    algorithm: Literal["rsl_ppo"]
+
+    @model_validator(mode="after")
+    def _batches_are_whole(self) -> Self:
+        if self.robots * self.horizon % self.batch:
+            raise ValueError(
+                f"robots · horizon = {self.robots * self.horizon} steps must be a multiple of the batch of {self.batch}"
+            )
+        return self
+
+
+class SHACSettings(Learner, OnTensors):
+    """Short-horizon actor-critic (Xu et al., 2022): the policy's gradient passes through the simulator itself."""
+
+    algorithm: Literal["shac"]
+    steps: PositiveInt = 2_000_000  # control periods of all robots together
+    learning_rate: PositiveFloat = 6e-3
+    critic_learning_rate: PositiveFloat = 2e-3
+    robots: PositiveInt = 256
+    window: PositiveInt = 16  # control periods through which a gradient passes
+    critic_batch: PositiveInt = 1024
+    critic_epochs: PositiveInt = 4
+    trace: Fraction = 0.95  # λ of the critic's targets
+    soft_update: Fraction = 0.8  # share of the critic that its target takes over after every window
+    greatest_gradient: PositiveFloat = 1.0  # a longer gradient is shortened to that norm
+    noise: NonNegativeFloat = 0.0  # standard deviation of what exploration adds to actions
+
+    @model_validator(mode="after")
+    def _batches_fit(self) -> Self:
+        if self.critic_batch > self.robots * self.window:
+            most = self.robots * self.window
+            raise ValueError(f"a critic_batch of {self.critic_batch} needs at most robots · window = {most} steps")
         return self
 
 
@@ -152,6 +211,10 @@ class ComputedTorqueSettings(Frozen):
     algorithm: Literal["computed torque"]
     known: KnownModel = "exact"
     natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
+
+
+LearnedSettings: TypeAlias = PPOSettings | SACSettings | RslPPOSettings | SHACSettings
+AgentSettings: TypeAlias = LearnedSettings | ComputedTorqueSettings
 
 
 class BenchmarkSettings(Frozen):
@@ -195,15 +258,15 @@ def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
     return parse(model, read_yaml(path), str(path))
 
 
-def read_agent(
-    name: str, changes: Mapping[str, Any] | None = None
-) -> PPOSettings | SACSettings | ComputedTorqueSettings:
+def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> AgentSettings:
     """Checked settings of an agent, with some fields changed."""
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}
-    kinds: dict[str, type[PPOSettings | SACSettings | ComputedTorqueSettings]] = {
+    kinds: dict[str, type[AgentSettings]] = {
         "ppo": PPOSettings,
         "sac": SACSettings,
+        "rsl_ppo": RslPPOSettings,
+        "shac": SHACSettings,
         "computed torque": ComputedTorqueSettings,
     }
     algorithm = content.get("algorithm")

@@ -1,4 +1,4 @@
-"""Training a policy: Stable-Baselines3 on the native batch, the best policy chosen on validation paths.
+"""Training a policy, by Stable-Baselines3 or on tensors; the best one is chosen on validation paths.
 
 With the same settings, seed, number of threads and versions on the same machine, a training run repeats bit for bit.
 """
@@ -22,7 +22,15 @@ from .metrics import Verdict, in_words, yardstick
 from .protocol import Agent
 from .provenance import versions, write_provenance
 from .sb3_environment import CasterVecEnv
-from .settings import Learner, PPOSettings, SACSettings, TaskSettings
+from .settings import (
+    LearnedSettings,
+    Learner,
+    PPOSettings,
+    RslPPOSettings,
+    SACSettings,
+    SHACSettings,
+    TaskSettings,
+)
 
 VALIDATION_SEED = 500
 Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
@@ -102,25 +110,83 @@ def actor_of(learner: BaseAlgorithm, settings: Learner) -> Actor:
     return actor
 
 
-class Watcher(BaseCallback):
-    """Validates at even intervals, keeps checkpoints and the best policy, and tells how far training is."""
+class Run:
+    """The folder of a training run: validates policies, keeps them all and the best one, and tells how far it is.
 
-    def __init__(
-        self,
-        folder: Path,
-        settings: PPOSettings | SACSettings,
-        describe: Callable[[int], PolicyDescription],
-        validation: Batch,
-        report: Report,
-    ) -> None:
-        super().__init__()
-        self.folder, self.settings, self.describe, self.validation = folder, settings, describe, validation
-        self.report = report
+    steps: done so far. logger: for what else there is to record; it writes progress.csv and TensorBoard events.
+    """
+
+    def __init__(self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, report: Report) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder, self.task, self.settings, self.seed, self.report = folder, task, settings, seed, report
+        self.logger = configure(str(folder), ["csv", "tensorboard"])
+        self.validation = test_batch(task, task.validation, starts=1)
         self.history: list[Validation] = []
         self.best: Validation | None = None
-        self.spent = 0.0
-        self.started = time.perf_counter()
+        self.steps = 0
+        self._validating = 0.0
+        self._started = time.perf_counter()
         self._due = settings.steps / settings.validations
+
+    def advance(self, steps: int, actor: Callable[[], Actor]) -> None:
+        """So many steps are done by now; validate what `actor` returns where that is due."""
+        self.steps = steps
+        if steps >= self._due:
+            self._due += self.settings.steps / self.settings.validations
+            self.validate(actor())
+        self.report(steps, in_words(self.history[-1].verdict) if self.history else "")
+
+    def finish(self, steps: int, actor: Callable[[], Actor]) -> None:
+        """Validate what has been learned since the last time."""
+        self.steps = steps
+        if not self.history or self.history[-1].steps < steps:
+            self.validate(actor())
+
+    def validate(self, actor: Actor) -> None:
+        """Try a policy on the validation paths, keep it, and keep it as the best one if it is."""
+        begun = time.perf_counter()
+        bundle = Bundle(self._describe(actor), actor)
+        result = Validation(
+            self.steps, begun - self._started - self._validating, verdict_on(bundle.agent, self.validation)
+        )
+        self.history.append(result)
+        for name, value in result.numbers.items():
+            self.logger.record(f"validation/{name}", value)
+        save_bundle(self.folder / "checkpoints" / f"{self.steps:010d}", bundle)
+        if self.best is None or result.verdict.merit > self.best.verdict.merit:
+            self.best = result
+            save_bundle(self.folder / "best", bundle)
+        self._write_history()
+        self._validating += time.perf_counter() - begun
+
+    def _describe(self, actor: Actor) -> PolicyDescription:
+        return PolicyDescription(
+            format=1,
+            name=self.settings.algorithm.upper(),
+            squash=actor.squash,
+            hidden=self.settings.hidden,
+            robot=bare(self.validation).robot,
+            environment=self.task.environment,
+            task=self.task.task,
+            wrappers=self.task.wrappers,
+            actions=actor.head.out_features,
+            trained_with={"settings": self.settings.model_dump(mode="json"), "seed": self.seed, "steps": self.steps},
+            versions=versions(),
+        )
+
+    def _write_history(self) -> None:
+        with (self.folder / "validation.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(self.history[0].numbers)
+            writer.writerows(result.numbers.values() for result in self.history)
+
+
+class Watcher(BaseCallback):
+    """Tells a run how far SB3 is."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__()
+        self.run = run
 
     def _on_step(self) -> bool:
         if isinstance(self.model, SAC):
@@ -132,83 +198,58 @@ class Watcher(BaseCallback):
             self._watch()
 
     def _watch(self) -> None:
-        if self.num_timesteps >= self._due:
-            self._due += self.settings.steps / self.settings.validations
-            self.validate()
-        self.report(self.num_timesteps, in_words(self.history[-1].verdict) if self.history else "")
+        self.run.advance(self.num_timesteps, lambda: actor_of(self.model, self.run.settings))
 
-    def validate(self) -> None:
-        """Try the present policy on the validation paths, keep it, and keep it as the best one if it is."""
-        begun = time.perf_counter()
-        bundle = Bundle(self.describe(self.num_timesteps), actor_of(self.model, self.settings))
-        verdict = verdict_on(bundle.agent, self.validation)
-        result = Validation(self.num_timesteps, begun - self.started - self.spent, verdict)
-        self.history.append(result)
-        for name, value in result.numbers.items():
-            self.logger.record(f"validation/{name}", value)
-        save_bundle(self.folder / "checkpoints" / f"{self.num_timesteps:010d}", bundle)
-        if self.best is None or result.verdict.merit > self.best.verdict.merit:
-            self.best = result
-            save_bundle(self.folder / "best", bundle)
-        self._write_history()
-        self.spent += time.perf_counter() - begun
 
-    def _write_history(self) -> None:
-        with (self.folder / "validation.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(self.history[0].numbers)
-            writer.writerows(result.numbers.values() for result in self.history)
+def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
+    """Train on the native batch of NumPy arrays."""
+    learner = make_learner(settings, CasterVecEnv(training_batch(run.task, settings.robots)), run.seed)
+    learner.set_logger(run.logger)
+    try:
+        learner.learn(settings.steps, callback=Watcher(run))
+    finally:
+        run.finish(learner.num_timesteps, lambda: actor_of(learner, settings))
 
 
 def train(
-    task: TaskSettings, settings: PPOSettings | SACSettings, seed: int, folder: Path, report: Report, threads: int = 2
+    task: TaskSettings, settings: LearnedSettings, seed: int, folder: Path, report: Report, threads: int = 2
 ) -> Validation:
     """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
     Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
     """
     torch.set_num_threads(threads)
-    environment = CasterVecEnv(training_batch(task, settings.robots))
-    validation = test_batch(task, task.validation, starts=1)
-    facts = {"settings": settings.model_dump(mode="json"), "seed": seed}
-
-    def describe(steps: int) -> PolicyDescription:
-        return PolicyDescription(
-            format=1,
-            name=settings.algorithm.upper(),
-            squash="clip" if isinstance(settings, PPOSettings) else "tanh",
-            hidden=settings.hidden,
-            robot=bare(validation).robot,
-            environment=task.environment,
-            task=task.task,
-            wrappers=task.wrappers,
-            actions=environment.actions,
-            trained_with={**facts, "steps": steps},
-            versions=versions(),
-        )
-
-    folder.mkdir(parents=True, exist_ok=True)
-    learner = make_learner(settings, environment, seed)
-    learner.set_logger(configure(str(folder), ["csv", "tensorboard"]))
-    watcher = Watcher(folder, settings, describe, validation, report)
+    learn = _learning(settings)
+    run = Run(folder, task, settings, seed, report)
     completed = False
     try:
-        learner.learn(settings.steps, callback=watcher)
+        learn(run, settings)
         completed = True
     finally:
-        if not watcher.history or watcher.history[-1].steps < learner.num_timesteps:
-            watcher.validate()
-        history = [result.numbers for result in watcher.history]
-        write_provenance(
-            folder,
-            task=task.model_dump(mode="json"),
-            agent=settings.model_dump(mode="json"),
-            seed=seed,
-            threads=threads,
-            completed=completed,
-            seconds=watcher.history[-1].seconds,
-            validations=history,
-        )
-        learner.logger.close()
-    assert watcher.best is not None  # validate() has just run
-    return watcher.best
+        if run.history:
+            write_provenance(
+                folder,
+                task=task.model_dump(mode="json"),
+                agent=settings.model_dump(mode="json"),
+                seed=seed,
+                threads=threads,
+                completed=completed,
+                seconds=run.history[-1].seconds,
+                validations=[result.numbers for result in run.history],
+            )
+        run.logger.close()
+    assert run.best is not None  # whoever learns finishes with a validation
+    return run.best
+
+
+def _learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:
+    """Who learns with such settings."""
+    if isinstance(settings, SHACSettings):
+        from .shac import learn_through_simulator
+
+        return learn_through_simulator
+    if isinstance(settings, RslPPOSettings):
+        from .rsl_rl import learn_with_rsl_rl
+
+        return learn_with_rsl_rl
+    return learn_with_sb3

@@ -5,11 +5,9 @@ from typing import Any
 import torch
 
 from caster_gym.engines.numpy_model import Model
+from caster_gym.engines.torch_scalars import checked_device, checked_dtype
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters
-from caster_gym.mechanics.scalars import register
 from caster_gym.robot import Robot
-
-register(torch.Tensor, torch.where, torch.sqrt, torch.any)
 
 
 class TorchModel(Model):
@@ -29,11 +27,9 @@ class TorchModel(Model):
         dtype: torch.dtype = torch.float64,
         device: torch.device | str = "cpu",
     ) -> None:
-        if dtype not in (torch.float32, torch.float64):
-            raise ValueError(f"dtype must be torch.float32 or torch.float64, got {dtype}")
         super().__init__(robot, dynamics, parameters)
-        self.dtype = dtype
-        self.device = torch.device(device)
+        self.dtype = checked_dtype(dtype)
+        self.device = checked_device(device)
 
     def _array(self, name: str, value: Any, last: int) -> Any:
         tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)

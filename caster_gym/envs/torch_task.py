@@ -1,0 +1,282 @@
+"""A task's control period as a function of tensors: state and actions in, state and outcome out, differentiable.
+
+The arithmetic is that of `tracking` and `following`, whose generic functions run here on tensors with an entry a robot.
+Nothing waits for the device, and nothing is written in place.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import torch
+from torch import Tensor
+
+from caster_gym.engines.guarding import settled
+from caster_gym.engines.torch_compiler import compiled
+from caster_gym.engines.torch_fleet import BODY_ROWS
+from caster_gym.engines.torch_scalars import check_memory, checked_device, checked_dtype
+from caster_gym.envs import block_layout as layout
+from caster_gym.envs.guides import judge
+from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine, track_engine
+from caster_gym.envs.task_engine import DRAW_A_PATH
+from caster_gym.envs.torch_guides import torch_guide
+from caster_gym.envs.torch_obstacles import Given, torch_surroundings
+from caster_gym.envs.torch_randomness import episode_seed, uniform
+from caster_gym.envs.tracking import (
+    GAP_LIMIT,
+    Neighbour,
+    Record,
+    Report,
+    Situation,
+    distance_square,
+    flat_report,
+    observe,
+    report,
+    start,
+)
+from caster_gym.mechanics.integration import State, difference, pack_state, unpack_state
+from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
+from caster_gym.mechanics.plant import driven_step
+from caster_gym.mechanics.scalars import Direction, Scalar, add, each, flatten, pairs, sqrt, total
+
+TaskName: TypeAlias = Literal["track", "follow"]
+
+DIAGNOSTICS = ("traction_use", "conditioning")
+_ENGINES = {"track": (track_engine, "random_paths"), "follow": (follow_engine, "rounded_square")}
+_BEFORE = -1.0  # [m] progress of an episode that is about to start
+
+
+class TaskState(NamedTuple):
+    """All that a batch keeps from one control period to the next; robots are the last axis."""
+
+    bodies: Tensor  # (7 + 2 N, robots): x, y, cos β, sin β in W, twist in B, cos δ, sin δ of each caster
+    progress: Tensor  # (robots,) [m] along the path, where the task measures it
+    room: Tensor  # (robots,) [m] gap to the nearest obstacle, infinite where there is none
+    clocks: Tensor  # int64 (robots,) control periods done in the episode
+    paths: Tensor  # int64 (robots,) index of the path
+    keys: Tensor  # int64 (robots,) from which all random numbers of a robot count
+    episodes: Tensor  # int64 (robots,) number of the episode that starts next
+
+    def detached(self) -> "TaskState":
+        """The same state without its past, through which no gradient passes any more."""
+        return TaskState(*(tensor.detach() for tensor in self))
+
+
+class TaskOutcome(NamedTuple):
+    """What a control period brought."""
+
+    observations: Tensor  # (robots, size)
+    rewards: Tensor  # (robots,)
+    terminated: Tensor  # bool (robots,)
+    truncated: Tensor  # bool (robots,)
+    report: Tensor  # (quantities, robots), which `TorchTask.info` names
+
+    @property
+    def ended(self) -> Tensor:
+        """Whose episode is over (robots,)."""
+        return self.terminated | self.truncated
+
+
+class TorchTask:
+    """One of the tasks, for robots of one kind, as functions of tensors.
+
+        state, outcome = task.begin(keys)
+        state, outcome = task.step(state, actions)  # actions (robots, driven joints) in −1 … 1
+        state, outcome = task.restart(state, outcome)  # new episodes where they have ended
+        state = state.detached()  # between windows of a rollout
+
+    Gradients pass from rewards, observations and reports to actions, states, wrenches and parameters of the robots,
+    wherever motor limits and kernels have a slope, and end where an episode starts anew. An action that is not a number
+    ends its robot's episode as not finite, since to look for it would wait for the device.
+
+    name: "track" or "follow". robot, path, actuation, arena, fields: as for `CasterTrackEnv` and `CasterFollowEnv`, the
+    fields being those of the task. longest: greatest number of control periods of an episode. compile fuses each part
+    of a step into few kernels; graphs replays them as CUDA graphs, without gradients, see `TorchVectorEnv`. Without
+    diagnostics, infos leave out traction use and conditioning, which take longer than everything else that is observed.
+
+    parameters: the robot's own numbers, which may be replaced by others, or by tensors (robots,) of them.
+    """
+
+    def __init__(
+        self,
+        name: TaskName = "track",
+        robot: RobotLike = "chung2008",
+        path: PathLike | None = None,
+        actuation: Actuation = None,
+        arena: ArenaLike = None,
+        fields: Mapping[str, Any] | None = None,
+        longest: int | None = None,
+        *,
+        device: torch.device | str = "cpu",
+        dtype: torch.dtype = torch.float32,
+        compile: bool = False,
+        graphs: bool = False,
+        diagnostics: bool = True,
+    ) -> None:
+        if name not in _ENGINES:
+            raise ValueError(f'the task must be "track" or "follow", got {name!r}')
+        self.dtype, self.device = checked_dtype(dtype), checked_device(device)
+        build, usual = _ENGINES[name]
+        made = build(robot, usual if path is None else path, actuation, arena, fields or {}, 1, longest)
+        self.engine, self.task = made
+        self.robot, self.layout, self.diagnostics = self.engine.robot, self.engine.layout, diagnostics
+        self.parameters: RobotParameters = robot_parameters(self.robot)
+        self._guide = torch_guide(self.engine.plan.guide, self.dtype, self.device)
+        self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
+        driven = self.robot.driven
+        self._slots = tuple(driven.index(joint) if joint in driven else -1 for joint in self.robot.joints)
+        self._move, self._look, self._place = self._moved, self._looked, self._placed
+        if compile:
+            self._move = compiled(self._moved, self.device, graphs)
+            self._look = compiled(self._looked, self.device, graphs)
+            self._place = compiled(self._placed, self.device, graphs)
+
+    def begin(self, keys: Tensor, path: Tensor | int = DRAW_A_PATH) -> tuple[TaskState, TaskOutcome]:
+        """First episodes of robots with the given keys, int64 (robots,); path: index for each, or drawn."""
+        count = len(keys)
+        rows = 3 * self.layout.size + 2 * (layout.FIXED_REPORT_ROWS + 4 * self.robot.caster_count)
+        check_memory(count, rows, self.dtype, self.device)
+        whole = torch.zeros(count, dtype=torch.int64, device=self.device)
+        none = self._empty(BODY_ROWS + 2 * self.robot.caster_count, count)
+        state = TaskState(
+            none,
+            none[0],
+            none[0],
+            whole,
+            whole,
+            torch.as_tensor(keys, device=self.device),
+            whole,
+        )
+        wanted = torch.as_tensor(path, device=self.device).expand(count)
+        return self._start(state, wanted)
+
+    def step(self, state: TaskState, actions: Tensor, wrench: Tensor | None = None) -> tuple[TaskState, TaskOutcome]:
+        """Hold actions (robots, driven joints) for a control period; nobody is restarted.
+
+        wrench (robots, 3): external, at C, in B [N, N, N m].
+        """
+        commands = self._commands(actions, len(state.clocks))
+        none = torch.zeros_like(commands[0])
+        (doubt,) = total(each(difference, (), commands))
+        forces = (none, none, none) if wrench is None else wrench.to(self.dtype).unbind(1)
+        push = add(tuple(forces), (doubt, doubt, doubt))
+        given = Given(commands, push, self.parameters)
+        bodies, record, room = state.bodies, self._empty(self._record_rows, len(none)), state.room
+        for _ in range(self.task.substeps):
+            bodies, record, room = self._move(bodies, record, room, given)
+            if self._around is not None:
+                h, share = self.task.time_step, 1.0 / self.task.substeps
+                bodies, record, room = self._around.careful_step(bodies, record, room, given, state.paths, h, share)
+        clocks = state.clocks + 1
+        outcome, progress, room = self._look(bodies, record, clocks, state.paths, state.progress, self.parameters)
+        return state._replace(bodies=bodies, progress=progress, room=room, clocks=clocks), outcome
+
+    def restart(
+        self, state: TaskState, outcome: TaskOutcome, where: Tensor | None = None, path: Tensor | int = DRAW_A_PATH
+    ) -> tuple[TaskState, TaskOutcome]:
+        """New episodes where they have ended, or of the robots of a mask (robots,).
+
+        Observations and reports become those of the starts; rewards and endings stay those of the step.
+        """
+        again = outcome.ended if where is None else where
+        fresh, first = self._start(state, torch.as_tensor(path, device=self.device).expand(len(again)))
+        merged = TaskState(*(torch.where(again, new, old) for new, old in zip(fresh, state, strict=True)))
+        return merged, outcome._replace(
+            observations=torch.where(again[:, None], first.observations, outcome.observations),
+            report=torch.where(again, first.report, outcome.report),
+        )
+
+    def info(self, report: Tensor) -> dict[str, Any]:
+        """Named quantities of all robots, as `CasterTrackEnv` describes them: tensors with robots in front."""
+        infos: dict[str, Any] = self.engine.info(report)  # type: ignore[arg-type]  # slices tensors as it does arrays
+        return infos if self.diagnostics else {name: infos[name] for name in infos if name not in DIAGNOSTICS}
+
+    @property
+    def _record_rows(self) -> int:
+        """Mean motor torques, then what a Record holds."""
+        return 2 * self.robot.caster_count + layout.RECORD_ROWS
+
+    def _empty(self, rows: int, count: int) -> Tensor:
+        return torch.zeros((rows, count), dtype=self.dtype, device=self.device)
+
+    def _commands(self, actions: Tensor, count: int) -> tuple[Tensor, ...]:
+        """A command in −1 … 1 for each motor, 0 where it is not driven."""
+        if actions.shape != (count, len(self.robot.driven)):
+            raise ValueError(f"actions must have shape {(count, len(self.robot.driven))}, got {tuple(actions.shape)}")
+        columns = actions.to(self.dtype).clamp(-1.0, 1.0).T.contiguous().unbind(0)  # strides would stop SIMD
+        none = torch.zeros_like(columns[0])
+        return tuple(none if slot < 0 else columns[slot] for slot in self._slots)
+
+    def _moved(self, bodies: Tensor, record: Tensor, room: Tensor, given: Given) -> tuple[Tensor, Tensor, Tensor]:
+        """States, records and rooms after one RK4 step; who may touch something stays, with a negative room."""
+        state, h, n = unpack_state(bodies.unbind(0)), self.task.time_step, 2 * self.robot.caster_count
+        target, drive = driven_step(state, pairs(given.commands), given.push, h, given.robot)
+        around = self._around
+        reach = 0.0 if around is None else around.hull.reach
+        end, room, went = settled(around, room, state, target, h, reach)
+        share = (1.0 / self.task.substeps) * (went.to(self.dtype) if isinstance(went, Tensor) else went)
+        mean = share * torch.stack((*flatten(drive.torques), drive.power))
+        return torch.stack(end), torch.cat((record[: n + 1] + mean, record[n + 1 :])), room
+
+    def _looked(
+        self, bodies: Tensor, record: Tensor, clocks: Tensor, paths: Tensor, before: Tensor, robot: RobotParameters
+    ) -> tuple[TaskOutcome, Tensor, Tensor]:
+        """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start."""
+        state, n = unpack_state(bodies.unbind(0)), 2 * self.robot.caster_count
+        torques, done = pairs(record[:n].unbind(0)), Record(*record[n:].unbind(0))
+        guidance = self._guide.fetch(state, clocks, paths, before)
+        reference = guidance.reference
+        gap, nearest = self._look_around(state, paths)
+        situation = Situation(guidance.progress, guidance.share, gap)
+        errors, ended, terms = judge(state, reference, torques, done, situation, robot, self._guide.weights)
+        if self.diagnostics:
+            whole = report(state, reference, errors, torques, done, situation, ended, terms, robot)
+        else:
+            none = torch.zeros_like(gap)
+            pose, wanted = state.position + state.heading, (reference.x, reference.y, reference.cos, reference.sin)
+            distance = sqrt(distance_square(errors))
+            whole = Report(ended, distance, errors.sin, errors.cos, none, none, terms, pose, wanted, done, situation)
+        told = list(flat_report(whole, torques))
+        told[layout.HEADING_SIN] = torch.atan2(errors.sin, errors.cos)
+        seen = observe(state, reference, errors, guidance.preview, nearest, robot)
+        (rewards,) = total(each(_alone, (), terms))
+        (failed,) = total(each(_alone, (), ended))
+        truncated = clocks >= self._guide.spans[paths, 2]
+        numbers = torch.stack([number.to(self.dtype) for number in told])
+        return TaskOutcome(torch.stack(seen).T, rewards, failed > 0.0, truncated, numbers), guidance.progress, gap
+
+    def _look_around(self, state: State, paths: Tensor) -> tuple[Tensor, tuple[Neighbour, ...]]:
+        """Gap to the nearest obstacle [m], and the obstacles that the observation shows."""
+        if self._around is not None:
+            return self._around.look(state, paths, self.layout.nearest)
+        none = torch.zeros_like(state.position[0])
+        return none + math.inf, ((none + GAP_LIMIT, none, none),) * self.layout.nearest
+
+    def _start(self, state: TaskState, wanted: Tensor) -> tuple[TaskState, TaskOutcome]:
+        """Everybody at the start of the next episode, on the wanted path or, where it is negative, a drawn one."""
+        bodies, paths = self._place(state.keys, state.episodes, wanted)
+        clocks, before = torch.zeros_like(state.clocks), torch.full_like(state.progress, _BEFORE)
+        nothing = self._empty(self._record_rows, len(clocks))
+        outcome, progress, room = self._look(bodies, nothing, clocks, paths, before, self.parameters)
+        return TaskState(bodies, progress, room, clocks, paths, state.keys, state.episodes + 1), outcome
+
+    def _placed(self, keys: Tensor, episodes: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
+        """States at the start of an episode, and its path."""
+        seed = episode_seed(keys, episodes)
+        drawn = (uniform(seed, 0) * len(self.engine.plan.names)).long()
+        paths = torch.where(wanted < 0, drawn, wanted)
+        x, y = (((2.0 * uniform(seed, i) - 1.0) * self.task.start_offset).to(self.dtype) for i in (1, 2))
+        turn = (2.0 * uniform(seed, 3) - 1.0) * self.task.start_turn
+        count = self.robot.caster_count
+        directions = tuple(self._direction(2.0 * math.pi * uniform(seed, 4 + i)) for i in range(count))
+        none = torch.zeros_like(x)
+        nowhere = State((none, none), (none, none), (none, none, none), directions)
+        guidance = self._guide.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)
+        return torch.stack(pack_state(start(guidance.reference, (x, y), self._direction(turn), directions))), paths
+
+    def _direction(self, angle: Tensor) -> Direction:
+        return torch.cos(angle).to(self.dtype), torch.sin(angle).to(self.dtype)
+
+
+def _alone(number: Scalar) -> tuple[Scalar]:
+    return (number,)
