@@ -77,9 +77,9 @@ def rms(series: Array) -> Array:
 
 
 def greatest(series: Array) -> Array:
-    """Greatest value over time of what is there."""
+    """Greatest value over time of what is there; not a number where nothing is."""
     there = np.isfinite(series)
-    most = np.where(there, series, -np.inf).max(axis=0)
+    most = np.where(there, series, -np.inf).max(axis=0, initial=-np.inf)
     return np.where(there.any(axis=0), most, np.nan)
 
 

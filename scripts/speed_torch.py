@@ -39,8 +39,8 @@ def bare_tensors(robot: Robot, count: int, device: str) -> Work:
 
 
 def environment_tensors(robot: str, count: int, device: str) -> Work:
-    """Steps of a whole batch in float32, with observations, rewards, infos and resets."""
-    environment = TorchVectorEnv("track", count, robot, device=device, compile=True, corridor=WIDE)
+    """Steps of a whole batch in float32, with observations, rewards, infos (but for diagnostics) and resets."""
+    environment = TorchVectorEnv("track", count, robot, device=device, compile=True, diagnostics=False, corridor=WIDE)
     environment.reset(seed=0)
     times = max(2, min(BANK, 2**18 // count))
     shape = (times, count, *(environment.single_action_space.shape or ()))

@@ -73,3 +73,8 @@ def test_a_field_tells_how_it_is_printed():
         ("done", "done"),
         ("runs", "runs"),
     ]
+
+
+def test_nothing_has_no_greatest_value():
+    """As of episodes that are over before they have settled."""
+    assert np.isnan(greatest(np.zeros((0, 3)))).all()

@@ -72,7 +72,7 @@ def announce_compilation(function: Callable[..., Any], work: str) -> None:
     """Say on stderr that compiling is ahead, unless the cache holds the compiled function already."""
     pattern = f"*{function.__name__}-*.nbi"
     if not any((_cache_root(_SETTINGS.CACHE_DIR) / _source_digest()).rglob(pattern)):
-        print(f"caster_gym compiles {work}, once on this machine; this takes 20 to 40 s", file=sys.stderr)
+        print(f"caster_gym compiles {work}, once on this machine; this takes 15 to 40 s", file=sys.stderr)
 
 
 @contextmanager

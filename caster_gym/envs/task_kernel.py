@@ -14,14 +14,9 @@ from caster_gym.engines.lanes import LANES, counting, read, read_pairs, read_rob
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
 from caster_gym.envs import randomness
 from caster_gym.envs.block_layout import (
-    ENDINGS,
-    FIRST_TERM,
-    HEADING_COS,
-    HEADING_SIN,
     NEIGHBOUR_ROWS,
     RECORD_ROWS,
     SITUATION_ROWS,
-    TERMS,
     Sizes,
     Views,
     World,
@@ -40,6 +35,7 @@ from caster_gym.envs.block_layout import (
     torque_row,
     wrench_row,
 )
+from caster_gym.envs.delivery import copy_rows, deliver, give_results
 from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge, weights_of
 from caster_gym.envs.randomness import uniform
 from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
@@ -260,56 +256,13 @@ def _insert(desk: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: S
 
 
 @register_jitable(**INLINE)
-def _deliver(desk: Any, lane: Any, count: Any, robot: Any, views: Views, sizes: Sizes) -> None:
-    """Copy observations and reports of so many robots, from a lane and a robot on, to where Python reads them."""
-    row = observation_row(sizes)
-    for i in range(count):
-        for j in range(views.observations.shape[1]):
-            views.observations[robot + i, j] = desk[(row + j) * LANES + lane + i]
-    row = report_row(sizes)
-    for j in range(views.reports.shape[0]):
-        for i in range(count):
-            views.reports[j, robot + i] = desk[(row + j) * LANES + lane + i]
-    for i in range(robot, robot + count):
-        views.reports[HEADING_SIN, i] = math.atan2(views.reports[HEADING_SIN, i], views.reports[HEADING_COS, i])
-
-
-@register_jitable(**INLINE)
-def _give_results(desk: Any, here: Any, robot: Any, world: World, views: Views, sizes: Sizes) -> None:
-    """Rewards, and which episodes have ended, of so many robots, from a robot on."""
-    row = report_row(sizes)
-    for i in range(here):
-        reward, failed = 0.0, 0.0
-        for j in range(TERMS):
-            reward += desk[(row + FIRST_TERM + j) * LANES + i]
-        for j in range(ENDINGS):
-            failed += desk[(row + j) * LANES + i]
-        views.results[0, robot + i] = reward
-        views.results[1, robot + i] = failed
-    for i in range(robot, robot + here):
-        periods = world.guide.spans[world.clocks[1, i], 2]
-        views.results[2, i] = 1.0 if world.clocks[0, i] >= periods else 0.0
-
-
-@register_jitable(**INLINE)
-def _copy(source: Any, target: Any, lane: Any, lanes: Any, rows: Any) -> None:
-    """Copy the first rows of all lanes, or of one."""
-    if lanes == LANES:
-        for i in range(rows * LANES):
-            target[i] = source[i]
-    else:
-        for row in range(rows):
-            target[row * LANES + lane] = source[row * LANES + lane]
-
-
-@register_jitable(**INLINE)
 def _step_lanes(
     i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes
 ) -> None:
     """One control period of the robots of block i, of which `look` observes as many as there are lanes."""
     first = i * LANES
     here = min(lanes, len(actions) - first)
-    _copy(world.blocks[i], desk, 0, lanes, block_rows(sizes))
+    copy_rows(world.blocks[i], desk, 0, lanes, block_rows(sizes))
     row = command_row(sizes)
     for j in range(2 * len(sizes.casters)):
         slot = world.slots[j]
@@ -319,10 +272,10 @@ def _step_lanes(
     for lane in range(here):
         world.clocks[0, first + lane] += 1
         _fetch(desk, lane, first + lane, world, sizes)
-    _copy(desk, world.blocks[i], 0, lanes, parameter_row(sizes))
+    copy_rows(desk, world.blocks[i], 0, lanes, parameter_row(sizes))
     look(desk, world.guide, sizes)
-    _deliver(desk, 0, here, first, views, sizes)
-    _give_results(desk, here, first, world, views, sizes)
+    deliver(desk, 0, here, first, views, sizes)
+    give_results(desk, here, first, world, views, sizes)
 
 
 @register_jitable(**INLINE)
@@ -384,7 +337,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
     for i in range(len(selected)):
         robot = selected[i]
         block, lane = world.blocks[robot // LANES], robot % LANES
-        _copy(block, desk, lane, 1, block_rows(sizes))
+        copy_rows(block, desk, lane, 1, block_rows(sizes))
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
@@ -406,9 +359,9 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         for row in range(command_row(sizes), reference_row(sizes)):
             desk[row * LANES + lane] = 0.0
         _fetch(desk, lane, robot, world, sizes)
-        _copy(desk, block, lane, 1, parameter_row(sizes))
+        copy_rows(desk, block, lane, 1, parameter_row(sizes))
         look_at_one(desk, lane, world.guide, sizes)
-        _deliver(desk, lane, 1, robot, views, sizes)
+        deliver(desk, lane, 1, robot, views, sizes)
 
 
 careful_step = compiled(_careful_step)
