@@ -18,7 +18,7 @@ from caster_gym.engines.threads import get_threads
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import draw_growth, growth_rows
 from scripts.speed_limits import operations_of_a_step
-from scripts.speed_page import Session, page
+from scripts.speed_page import Occasion, page
 from scripts.speed_peers import peer_rows
 from scripts.speed_processes import FIRST_STEP, fresh, memory_rows, start_rows
 from scripts.speed_robots import bare_rows, environment_rows, single_rows
@@ -106,9 +106,9 @@ def main(arguments: list[str] | None = None) -> None:
     accuracy = measure_accuracy(robot)
     measured = run([*(row for _, _, rows in parts for row in rows), *growth], turns)
     command = shlex.join(["python", "-m", "scripts.measure_speed", *(sys.argv[1:] if arguments is None else arguments)])
-    session = Session(command, turns, seconds, cores, (load, os.getloadavg()[0]), chosen.quick)
+    occasion = Occasion(command, turns, seconds, cores, (load, os.getloadavg()[0]), chosen.quick)
     folder = Path("speed") if chosen.out is None else chosen.out.with_suffix("")
-    text = page(parts, measured, accuracy, robot.name, operations_of_a_step(robot), folder.name, session)
+    text = page(parts, measured, accuracy, robot.name, operations_of_a_step(robot), folder.name, occasion)
     if chosen.out is None:
         print(text)
         return

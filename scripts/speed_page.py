@@ -70,7 +70,7 @@ RATIOS = (
 )
 
 
-class Session(NamedTuple):
+class Occasion(NamedTuple):
     """Where and how it was measured."""
 
     command: str
@@ -88,13 +88,13 @@ def page(
     robot: str,
     operations: int,
     folder: str,
-    session: Session,
+    occasion: Occasion,
 ) -> str:
     """All results as Markdown; sections: title, remark and rows; figures lie in a folder beside the page."""
     parts = [
         "# Speed",
         paragraph(
-            f"""Ours and its peers, measured side by side in one run: {session.turns} short turns of all rows, in an
+            f"""Ours and its peers, measured side by side in one run: {occasion.turns} short turns of all rows, in an
             order drawn anew for each, so that a busy moment of the machine hits all of them alike. Ratios are taken
             turn by turn. Every number is the median over the turns, with the middle half of the turns beside it. A
             "step" is a step of that row's own kind: an RK4 step of {1e3 * RK4_STEP:g} ms, a control period of
@@ -122,7 +122,7 @@ def page(
         "## What limits each engine",
         limits_text(measured, accuracy, operations),
         "## How it was measured",
-        origin(session, folder),
+        origin(occasion, folder),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -198,17 +198,17 @@ def accuracy_text(accuracy: Accuracy, robot: str) -> str:
     return f"{paragraph(text)}\n\n{table(heads, lines)}"
 
 
-def origin(session: Session, folder: str) -> str:
+def origin(occasion: Occasion, folder: str) -> str:
     """Command, machine and versions."""
     versions = ", ".join(f"{library} {found(library)}" for library in LIBRARIES)
     return "\n".join(
         [
-            f"- Command: `{session.command}`",
-            *(["- A quick look, without Torch, memory and compiling from nothing"] if session.quick else []),
-            f"- {session.turns} turns of {session.seconds:g} s a row, at least one call; all values: "
+            f"- Command: `{occasion.command}`",
+            *(["- A quick look, without Torch, memory and compiling from nothing"] if occasion.quick else []),
+            f"- {occasion.turns} turns of {occasion.seconds:g} s a row, at least one call; all values: "
             f"[turns.csv]({folder}/turns.csv)",
-            f"- Machine: {processor()}, {os.cpu_count()} cores, of which {session.cores} are used",
-            f"- Load of the machine: {session.loads[0]:.1f} at the start, {session.loads[1]:.1f} at the end "
+            f"- Machine: {processor()}, {os.cpu_count()} cores, of which {occasion.cores} are used",
+            f"- Load of the machine: {occasion.loads[0]:.1f} at the start, {occasion.loads[1]:.1f} at the end "
             "(of an idle one 0 at the start; at the end it is that of the measurement)",
             f"- Versions: Python {platform.python_version()}, {versions}",
         ]

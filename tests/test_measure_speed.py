@@ -9,13 +9,13 @@ from caster_gym import load_robot
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import field, growth_table, line, with_casters
 from scripts.speed_limits import Counted, limits_text, operations_of_a_step
-from scripts.speed_page import RATIOS, Session, page
+from scripts.speed_page import RATIOS, Occasion, page
 from scripts.speed_peers import MUJOCO_STEP, peer_rows
 from scripts.speed_robots import COARSE_STEP, RK4_STEP, bare_rows, environment_rows, single_rows
 from scripts.speed_timing import Ratio, Row, Work, at_least, at_most, rate, run, shown, spread
 
 ROBOT = load_robot("chung2008")
-SESSION = Session("python -m scripts.measure_speed", 1, 1e-9, 1, (0.0, 0.0), True)
+SESSION = Occasion("python -m scripts.measure_speed", 1, 1e-9, 1, (0.0, 0.0), True)
 
 
 @pytest.mark.parametrize(
