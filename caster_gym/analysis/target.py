@@ -8,6 +8,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from caster_gym.analysis.actuation import DEGREES_OF_FREEDOM, SINGULAR, worst_conditioning
 from caster_gym.analysis.joint_sets import classify
 from caster_gym.configuration import Frozen
+from caster_gym.mechanics.parameters import robot_parameters, with_load
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.robot import Robot
 
@@ -55,12 +56,8 @@ def loaded(robot: Robot, target: Target) -> Robot:
     load, bare = target.payload, robot.platform
     if load is None or load.mass + load.inertia == 0.0:
         return robot
-    mass = bare.mass + load.mass
-    x, y = ((bare.mass * p + load.mass * q) / mass for p, q in zip(bare.com, load.com, strict=True))
-    inertia = bare.inertia + load.inertia
-    for part in (bare, load):
-        inertia += part.mass * ((part.com[0] - x) ** 2 + (part.com[1] - y) ** 2)
-    platform = bare.model_copy(update={"mass": mass, "inertia": inertia, "com": (x, y)})
+    full = with_load(robot_parameters(robot).platform, load.mass, *load.com, load.inertia)
+    platform = bare.model_copy(update={"mass": full.mass, "inertia": full.inertia, "com": (full.com_x, full.com_y)})
     return robot.model_copy(update={"platform": platform})
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from caster_gym.configuration import did_you_mean, parse
-from caster_gym.mechanics.parameters import Dynamics, PlatformParameters, RobotParameters, robot_parameters
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters, with_load
 from caster_gym.mechanics.scalars import Scalar
 from caster_gym.robot import Caster, Robot
 
@@ -98,21 +98,6 @@ def check_alike(robot: Robot, names: Sequence[str]) -> None:
                     f"all casters of robot {robot.name!r} must have the same {name} for it to be identified, "
                     f"got {values[0]:g} … {values[-1]:g} {UNITS[name]}"
                 )
-
-
-def with_load(
-    platform: PlatformParameters, mass: Scalar, x: Scalar, y: Scalar, inertia: Scalar = 0.0
-) -> PlatformParameters:
-    """A platform and a load of a mass [kg] at (x, y) in B [m], with an inertia about its own mass centre [kg m²]."""
-    together = platform.mass + mass
-    away_x, away_y = x - platform.com_x, y - platform.com_y
-    apart = platform.mass * mass / together * (away_x * away_x + away_y * away_y)  # about their common mass centre
-    return platform._replace(
-        mass=together,
-        inertia=platform.inertia + inertia + apart,
-        com_x=platform.com_x + mass / together * away_x,
-        com_y=platform.com_y + mass / together * away_y,
-    )
 
 
 def parameters_with(robot: Robot, values: Mapping[str, Scalar], dynamics: Dynamics = "exact") -> RobotParameters:

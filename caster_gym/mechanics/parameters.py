@@ -119,6 +119,21 @@ def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamic
     )
 
 
+def with_load(
+    platform: PlatformParameters, mass: Scalar, x: Scalar, y: Scalar, inertia: Scalar = 0.0
+) -> PlatformParameters:
+    """A platform and a load of a mass [kg] at (x, y) in B [m], with an inertia about its own mass centre [kg m²]."""
+    together = platform.mass + mass
+    away_x, away_y = x - platform.com_x, y - platform.com_y
+    apart = platform.mass * mass / together * (away_x * away_x + away_y * away_y)  # about their common mass centre
+    return platform._replace(
+        mass=together,
+        inertia=platform.inertia + inertia + apart,
+        com_x=platform.com_x + mass / together * away_x,
+        com_y=platform.com_y + mass / together * away_y,
+    )
+
+
 def pack_parameters(robot: RobotParameters) -> tuple[Scalar, ...]:
     """All numbers in one row: the platform's, then each caster's, in the order of their fields."""
     flat = tuple(robot.platform)

@@ -67,12 +67,12 @@ def _over_dr(rows: Rows, p: Lengths) -> Rows:
 
 
 def _chung_12(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     return (-d * t.s1 - a, r * t.c1, -a), (-d * t.c1 + l / 2, -r * t.s1, l / 2), (1.0, 0.0, 1.0)
 
 
 def _chung_13(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     return (-d * t.s2 - a, r * t.c2, -a), (-d * t.c2 - l / 2, -r * t.s2, -l / 2), (1.0, 0.0, 1.0)
 
 
@@ -82,7 +82,7 @@ def _chung_14(t: Angles, p: Lengths) -> Rows:
 
 
 def _chung_15(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     eta = (-r * t.s1, -r * t.c1, l / 2 * r * t.c1 - a * r * t.s1)
     theta = (d * t.c1, -d * t.s1, l / 2 * d * t.s1 + a * d * t.c1)
     phi = (r * t.s1, r * t.c1, d * r + a * r * t.s1 - l / 2 * r * t.c1)
@@ -91,7 +91,7 @@ def _chung_15(t: Angles, p: Lengths) -> Rows:
 
 def _chung_16_below(t: Angles, p: Lengths) -> Rows:
     """The second and third row of (16)."""
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     theta = (d * t.c2, -d * t.s2, -l / 2 * d * t.s2 + a * d * t.c2)
     return theta, (r * t.s2, r * t.c2, d * r + a * r * t.s2 + l / 2 * r * t.c2)
 
@@ -136,12 +136,12 @@ def _kim_13(number: int) -> Entries:
 
 
 def _kim_15(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     return (-d * t.c1 - a, r * t.s1, -a), (d * t.s1 + l / 2, r * t.c1, l / 2), (1.0, 0.0, 1.0)
 
 
 def _kim_16(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     return (-d * t.c2 - a, r * t.s2, -a), (d * t.s2 - l / 2, r * t.c2, -l / 2), (1.0, 0.0, 1.0)
 
 
@@ -151,14 +151,14 @@ def _kim_17(t: Angles, p: Lengths) -> Rows:
 
 
 def _kim_20(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     eta = (-r * t.c1, r * t.s1, -l * r / 2 * t.s1 - a * r * t.c1)
     theta = (d * t.s1, d * t.c1, -d * l / 2 * t.c1 + a * d * t.s1)
     return _over_dr((eta, theta, (r * t.c1, -r * t.s1, d * r + l * r / 2 * t.s1 + a * r * t.c1)), p)
 
 
 def _kim_21(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     eta = (-r * t.c2, r * t.s2, l * r / 2 * t.s2 - a * r * t.c2)
     theta = (d * t.s2, d * t.c2, d * l / 2 * t.c2 + a * d * t.s2)
     return _over_dr((eta, theta, (r * t.c2, -r * t.s2, d * r - l * r / 2 * t.s2 + a * r * t.c2)), p)
@@ -180,7 +180,7 @@ def _kim_22_corrected(t: Angles, p: Lengths) -> Rows:
 
 def _kim_24_above(t: Angles, p: Lengths) -> Rows:
     """The first and second row of (24)."""
-    l, a, _, _, d = p  # noqa: E741
+    l, a, _, _, d = p  # noqa: E741 - the papers' letters
     first = (d * t.s1, d * t.c1, -d * l / 2 * t.c1 + a * d * t.s1)
     return first, (d * t.s2, d * t.c2, d * l / 2 * t.c2 + a * d * t.s2)
 
@@ -196,7 +196,7 @@ def _kim_24_corrected(t: Angles, p: Lengths) -> Rows:
 
 
 def _kim_37(t: Angles, p: Lengths) -> Rows:
-    l, a, _, r, d = p  # noqa: E741
+    l, a, _, r, d = p  # noqa: E741 - the papers' letters
     rows = (
         (-r * t.c1, r * t.s1, -l * r / 2 * t.s1 - a * r * t.c1),
         (d * t.s1, d * t.c1, -d * l / 2 * t.c1 + a * d * t.s1),

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, model_validator
 
-from caster_gym.mechanics.parameters import CASTER_FIELDS, PLATFORM_FIELDS, CasterParameters, PlatformParameters
+from caster_gym.mechanics.parameters import (
+    CASTER_FIELDS,
+    PLATFORM_FIELDS,
+    CasterParameters,
+    PlatformParameters,
+    with_load,
+)
 from caster_gym.wrappers.draws import uniforms
 from caster_gym.wrappers.feature import (
     Array,
@@ -99,14 +105,9 @@ class _Payload(PlantRuntime):
         shares = uniforms(seeds, np.arange(3))
         added = between(feature.mass, shares[:, 0])
         x, y = between(feature.x, shares[:, 1]), between(feature.y, shares[:, 2])
-        mass, inertia, com_x, com_y = (parameters[:, _platform(name)] for name in ("mass", "inertia", "com_x", "com_y"))
-        together = mass + added
-        away = (x - com_x) ** 2 + (y - com_y) ** 2  # parallel axes: two masses about their common centre
+        bare = PlatformParameters(*parameters[:, :PLATFORM_FIELDS].T)
         rebuilt = parameters.copy()
-        rebuilt[:, _platform("mass")] = together
-        rebuilt[:, _platform("inertia")] = inertia + feature.inertia + mass * added / together * away
-        rebuilt[:, _platform("com_x")] = (mass * com_x + added * x) / together
-        rebuilt[:, _platform("com_y")] = (mass * com_y + added * y) / together
+        rebuilt[:, :PLATFORM_FIELDS] = np.stack(with_load(bare, added, x, y, feature.inertia), axis=1)
         return rebuilt
 
 

@@ -30,7 +30,7 @@ ROUNDING = 1e-12  # of determinants of up to some hundred, and of singular value
 def determinant_27(lengths: Lengths, phi: ArrayLike, corrected: bool = False) -> Array:
     """(27): the determinant (...) of (24) at φ (..., 3) [rad], as printed or corrected."""
     p1, p2, p3 = np.moveaxis(np.asarray(phi, dtype=np.float64), -1, 0)
-    l, a, b, r, d = lengths  # noqa: E741
+    l, a, b, r, d = lengths  # noqa: E741 - the papers' letters
     first = np.sin(p1 - p2) if corrected else np.sin(p2 - p1)  # E6
     others = l / 2 * np.cos(p1) * np.cos(p3 - p2) + l / 2 * np.cos(p2) * np.cos(p3 - p1)
     value: Array = (first * (d - (a + b) * np.cos(p3)) + others) / (d * r**2)
