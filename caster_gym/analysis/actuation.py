@@ -6,8 +6,8 @@ meet in a point or are parallel, no motor pushes in some direction. Kim et al. (
 """
 
 import warnings
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,12 @@ SINGULAR = 0.01  # [-] below it the weakest push is less than a hundredth of the
 DEGREES_OF_FREEDOM = 3
 
 _SAMPLES = (16, 512)  # batches × samples: the best of each batch starts a descent, lest all start in one basin
-_DESCENT: Any = {"gtol": 1e-6, "maxiter": 50}  # of BFGS: L-BFGS-B spins in threaded BLAS, 10 s on a busy machine
-_ZERO = 1e-7  # [-] conditioning is the root of an eigenvalue, so rounding alone makes 1e-8; nothing lies below zero
-_DIFFERENCE = 1e-6  # [rad] of central differences; conditioning² is smooth at its zeros, where conditioning has a kink
+_STEPS = 40  # of a descent; near its end each doubles the digits
+_ZERO = 1e-16  # [-] of conditioning², where rounding alone may lead; nothing lies below zero
+_HOPELESS = 1e6  # [-] damping so strong that steps cannot lead down any more
+_DIFFERENCE = 1e-4  # [rad] of differences; conditioning² is smooth at its zeros, where conditioning has a kink
+
+Array = NDArray[np.float64]
 
 
 class ActuationWarning(UserWarning):
@@ -35,29 +38,44 @@ def worst_conditioning(robot: Robot) -> tuple[float, tuple[float, ...]]:
     Angles in rad, in (−π, π]. The search is global by sampling and local by descent, with fixed seeds: the value is
     attained at the angles, and another search may find a slightly lower one. Zeros come out as rounding, about 1e-8.
     """
-    from scipy.optimize import minimize
-
     model = Model(robot)
     samples = np.random.default_rng(0).uniform(-np.pi, np.pi, (*_SAMPLES, robot.caster_count))
-    values = model.conditioning(samples)
-    starts = samples[np.arange(len(samples)), values.argmin(axis=1)]
-    scale = max(float(values.min()) ** 2, 1e-12)  # makes the objective of order 1, where the tolerances mean something
+    starts = samples[np.arange(len(samples)), model.conditioning(samples).argmin(axis=1)]
+    ends = _descended(lambda steering: np.square(model.conditioning(steering)), starts)
+    values = model.conditioning(ends)
+    worst = np.pi - (np.pi - ends[values.argmin()]) % (2.0 * np.pi)
+    return float(values.min()), tuple(worst.tolist())
 
-    def squared(steering: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        steps = _DIFFERENCE * np.eye(len(steering))
-        around = model.conditioning(np.concatenate(([steering], steering + steps, steering - steps))) ** 2 / scale
-        forward, backward = np.split(around[1:], 2)
-        return float(around[0]), (forward - backward) / (2.0 * _DIFFERENCE)
 
-    least, worst = float("inf"), starts[0]
-    for start in starts[values.min(axis=1).argsort()]:
-        end = minimize(squared, start, jac=True, method="BFGS", options=_DESCENT).x
-        value = abs(float(model.conditioning(end)))
-        if value < least:
-            least, worst = value, end
-        if least < _ZERO:
+def _descended(function: Callable[[Array], Array], points: Array) -> Array:
+    """Where Newton's damped steps lead from all points (P, N) at once, never upwards, until one of them is at zero.
+
+    The derivatives are differences. (SciPy's minimisers would do, one point after the other; but they take longer to
+    import than an environment to make its first step, and every new environment searches.)
+    """
+    values, damping = function(points), np.ones(len(points))
+    for _ in range(_STEPS):
+        gradients, curvatures = _differences(function, points)
+        slopes, axes = np.linalg.eigh(curvatures)
+        along = np.einsum("pij,pi->pj", axes, gradients) / (np.abs(slopes) + damping[:, None] + _DIFFERENCE**2)
+        tried = points - np.einsum("pij,pj->pi", axes, along)
+        reached = function(tried)
+        better = reached < values
+        points, values = np.where(better[:, None], tried, points), np.where(better, reached, values)
+        damping *= np.where(better, 0.1, 10.0)
+        if values.min() < _ZERO or damping.min() > _HOPELESS:
             break
-    return least, tuple(float(np.pi - (np.pi - angle) % (2.0 * np.pi)) for angle in worst)
+    return points
+
+
+def _differences(function: Callable[[Array], Array], points: Array) -> tuple[Array, Array]:
+    """Gradients (P, N) and second derivatives (P, N, N) of a function of points (P, N)."""
+    step = _DIFFERENCE * np.eye(points.shape[1])
+    ahead, behind = function(points[:, None] + step), function(points[:, None] - step)
+    i, j = step[:, None], step  # both of them at once
+    here = points[:, None, None]
+    rising = function(here + i + j) - function(here + i - j) - function(here - i + j) + function(here - i - j)
+    return (ahead - behind) / (2.0 * _DIFFERENCE), rising / (4.0 * _DIFFERENCE**2)
 
 
 def warn_if_singular(robot: Robot) -> None:
