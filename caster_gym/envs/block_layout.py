@@ -1,11 +1,12 @@
 """How the quantities of a task lie in memory, and what else a batch keeps.
 
-Rows of a block, which is kept from step to step: state, room, wrench, progress, robot parameters. On a desk, which
-stays in the processor's cache, one block after the other is worked out; behind the rows of the block it has motor
-commands, mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two arrays
-instead of one desk would stop the compiler from making SIMD loops.) The tuples in `Sizes` have an item per caster, per
-previewed point and per observed obstacle: their lengths are part of their types, so that all rows are constants of the
-compiled code.
+Rows of a block, which is kept from step to step: state, room, wrench, progress. On a desk, which stays in the
+processor's cache, one block after the other is worked out; behind the rows of the block it has the robots' parameters,
+motor commands, mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two
+arrays instead of one desk would stop the compiler from making SIMD loops.) Robots that are all alike share the
+parameters of one block, which then stay on the desk; a robot alone lives on its desk. The tuples in `Sizes` have an
+item per caster, per previewed point and per observed obstacle: their lengths are part of their types, so that all rows
+are constants of the compiled code.
 """
 
 from typing import Any, NamedTuple
@@ -30,6 +31,7 @@ class World(NamedTuple):
     """What a batch keeps from step to step."""
 
     blocks: Any  # float64 (blocks, rows · LANES)
+    parameters: Any  # float64 (blocks, fields · LANES), or (1, fields · LANES) which all blocks share
     clocks: Any  # int64 (2, robots): control periods done, path
     seeds: Any  # uint64 (2, robots): key, episode
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
@@ -77,20 +79,20 @@ def progress_row(sizes: Sizes) -> int:
 
 @register_jitable(**INLINE)
 def parameter_row(sizes: Sizes) -> int:
-    """First row of the robot's parameters, the last ones of a block."""
+    """First row of the robot's parameters, behind the rows of a block."""
     return progress_row(sizes) + 1
 
 
 @register_jitable(**INLINE)
-def block_rows(sizes: Sizes) -> int:
-    """Rows of a block."""
-    return parameter_row(sizes) + PLATFORM_FIELDS + CASTER_FIELDS * len(sizes.casters)
+def parameter_rows(sizes: Sizes) -> int:
+    """Rows of the robot's parameters."""
+    return PLATFORM_FIELDS + CASTER_FIELDS * len(sizes.casters)
 
 
 @register_jitable(**INLINE)
 def command_row(sizes: Sizes) -> int:
     """First row of the motor commands."""
-    return block_rows(sizes)
+    return parameter_row(sizes) + parameter_rows(sizes)
 
 
 @register_jitable(**INLINE)

@@ -25,6 +25,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.engine, self.task, self.robot = engine, task, engine.robot
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
+        self._action_shape = self.action_space.shape
         self.render_mode = checked_mode(render_mode, self.metadata)
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
         self._easel = Easel(engine, self.render_mode, self.metadata["render_fps"])
@@ -42,19 +43,19 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         outcome = self.engine.restart(_ONLY, path=path)
         if self.render_mode == "human":
             self.render()
-        return outcome.observations[0], self.engine.info_of_one(outcome.reports[:, 0])
+        return outcome.observations[0], self.engine.info(outcome.reports[:, 0])
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
-        actions = np.asarray(action, dtype=np.float32)
-        if actions.shape != self.action_space.shape:
-            raise ValueError(f"action must have shape {self.action_space.shape}, got {actions.shape}")
+        given = np.ascontiguousarray(action, dtype=np.float32)
+        if given.shape != self._action_shape:
+            raise ValueError(f"action must have shape {self._action_shape}, got {np.shape(action)}")
         if not self._started:
             raise RuntimeError("reset the environment before its first step")
-        observation, reward, terminated, truncated, report = self.engine.step_alone(np.ascontiguousarray(actions))
+        observation, reward, terminated, truncated, report = self.engine.step_alone(given)
         if self.render_mode == "human":
             self.render()
-        return observation, reward, terminated, truncated, self.engine.info_of_one(report)
+        return observation, reward, terminated, truncated, self.engine.info(report)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The present moment as an image (height, width, 3), or in a window, as `render_mode` says."""

@@ -22,14 +22,14 @@ from caster_gym.envs.block_layout import (
 
 
 @register_jitable(**INLINE)
-def copy_rows(source: Any, target: Any, lane: Any, lanes: Any, rows: Any) -> None:
-    """Copy the first rows of all lanes, or of one."""
+def copy_rows(source: Any, target: Any, lane: Any, lanes: Any, rows: Any, first: Any) -> None:
+    """Copy the first rows of all lanes, or of one, to the rows from `first` on."""
     if lanes == LANES:
         for i in range(rows * LANES):
-            target[i] = source[i]
+            target[first * LANES + i] = source[i]
     else:
         for row in range(rows):
-            target[row * LANES + lane] = source[row * LANES + lane]
+            target[(first + row) * LANES + lane] = source[row * LANES + lane]
 
 
 @register_jitable(**INLINE)

@@ -10,9 +10,19 @@ from caster_gym.engines.held import Held
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import announce_compilation
+from caster_gym.engines.recycling import Shelf
 from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
+from caster_gym.envs.block_layout import (
+    ENDINGS,
+    FIRST_POSE,
+    FIRST_RECORD,
+    FIRST_SITUATION,
+    FIRST_TERM,
+    FIXED_REPORT_ROWS,
+    HEADING_SIN,
+)
 from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.scene import Scene
@@ -26,6 +36,11 @@ from caster_gym.mechanics.separation import Surroundings
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
+
+_TERMS = slice(FIRST_TERM, FIRST_POSE)
+_TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
+_POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIRST_POSE + 4 : FIRST_POSE + 8]
+_IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
 
 
 class Outcome(NamedTuple):
@@ -76,16 +91,25 @@ class TaskEngine:
         )
         check_memory(count, layout.desk_rows(self._sizes))
         self._spread = np.array([pace.start_offset, pace.start_turn])
-        self._report_rows = layout.FIXED_REPORT_ROWS + 2 * robot.caster_count
-        nominal = np.array([pack_parameters(robot_parameters(robot))])
-        self._parameter_row = layout.parameter_row(self._sizes)
-        blocks = np.zeros((block_count(count), (self._parameter_row + nominal.shape[1]) * LANES))
-        to_lanes(np.repeat(nominal, count, axis=0), blocks, self._parameter_row)
+        self._observation_size = observed.size
+        self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count
         self._desk = np.zeros(layout.desk_rows(self._sizes) * LANES)
-        self._reports = np.zeros((self._report_rows, count))  # the latest, for pictures
+        kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
+        if count == 1:
+            blocks, parameters = self._desk.reshape(1, -1), self._desk[kept * LANES : end * LANES].reshape(1, -1)
+        else:
+            blocks, parameters = np.zeros((block_count(count), kept * LANES)), np.zeros((1, (end - kept) * LANES))
+        to_lanes(np.array([pack_parameters(robot_parameters(robot))]), parameters, 0)
+        self._reports: NDArray[np.float64] = np.zeros((self._report_rows, count))  # the latest, for pictures
+        self._shelves = (
+            Shelf((count, observed.size), np.float32),
+            Shelf((self._report_rows, count), np.float64),
+            Shelf((3, count), np.float64),
+        )
         among = len(plan.around.obstacles.radii) > 0
         self._world = layout.World(
             blocks=blocks,
+            parameters=parameters,
             clocks=np.zeros((2, count), dtype=np.int64),
             seeds=np.zeros((2, count), dtype=np.uint64),
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
@@ -97,7 +121,8 @@ class TaskEngine:
             time_step=pace.time_step,
         )
         if count == 1:
-            self._held, self._results = Held((self._world, self._desk)), np.zeros(3)
+            self._results = np.zeros(3)
+            self._held = Held((self._world, self._desk, self._results, self._sizes))
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
@@ -121,7 +146,7 @@ class TaskEngine:
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         kernel.restart(selected, paths, self._world, self._spread, views, self._desk, self._sizes)
         if into is None:
-            self._reports = self._reports.copy()
+            self._reports = self._reports.reshape(self._report_rows, -1).copy()
             self._reports[:, selected] = outcome.reports[:, selected]
         return outcome
 
@@ -141,9 +166,7 @@ class TaskEngine:
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
         """Move all robots for one control period under actions (robots, driven joints) in −1 … 1."""
-        observations = np.empty((self.count, self.layout.size), dtype=np.float32)
-        reports = np.empty((self._report_rows, self.count))
-        results = np.empty((3, self.count))
+        observations, reports, results = (shelf.take() for shelf in self._shelves)
         views = layout.Views(observations, reports, results)
         over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
         self._reports = reports
@@ -157,11 +180,11 @@ class TaskEngine:
         Faster than `step`, and the same to the last bit. Raises ValueError for an action (driven joints,) that is not a
         number.
         """
-        observation = np.empty(self.layout.size, dtype=np.float32)
+        observation = np.empty(self._observation_size, dtype=np.float32)
         report = np.empty(self._report_rows)
-        if not kernel.step_single(self._held, action, observation, report, self._results, self._sizes):
+        if not kernel.step_single(self._held, action, observation, report):
             raise ValueError(f"action must hold numbers, got {action}")
-        self._reports = report[:, None]
+        self._reports = report
         reward, failed, late = self._results.tolist()
         return observation, reward, failed > 0.0, late > 0.0, report
 
@@ -204,8 +227,8 @@ class TaskEngine:
     @property
     def parameters(self) -> NDArray[np.float64]:
         """Every robot's numbers (robots, fields), in the order of `pack_parameters`, as a copy."""
-        width = self._world.blocks.shape[1] // LANES - self._parameter_row
-        return from_lanes(self._world.blocks, self._parameter_row, width, self.count)
+        everybody = np.broadcast_to(self._world.parameters, (block_count(self.count), self._world.parameters.shape[1]))
+        return from_lanes(everybody, 0, layout.parameter_rows(self._sizes), self.count)
 
     def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64]) -> None:
         """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`."""
@@ -213,7 +236,10 @@ class TaskEngine:
         if rows.shape != (len(selected), changed.shape[1]):
             raise ValueError(f"rows must have shape {(len(selected), changed.shape[1])}, got {rows.shape}")
         changed[selected] = rows
-        to_lanes(changed, self._world.blocks, self._parameter_row)
+        if len(self._world.parameters) < block_count(self.count):
+            own = np.zeros((block_count(self.count), self._world.parameters.shape[1]))
+            self._world = self._world._replace(parameters=own)
+        to_lanes(changed, self._world.parameters, 0)
 
     @property
     def paths(self) -> NDArray[np.int64]:
@@ -221,32 +247,28 @@ class TaskEngine:
         return np.array(self._world.clocks[1])
 
     def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
-        """Named quantities of all robots: arrays (robots,) or (robots, width), reward terms in a dictionary."""
-        return self._named(reports, lambda first, end: reports[first:end].T)
+        """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
 
-    def info_of_one(self, report: NDArray[np.float64]) -> dict[str, Any]:
-        """Named quantities of one robot: numbers or arrays (width,), reward terms in a dictionary."""
-        return self._named(report.tolist(), lambda first, end: report[first:end])
-
-    def _named(self, row: Any, rows: Callable[[int, int], NDArray[np.float64]]) -> dict[str, Any]:
-        terms, pose = layout.FIRST_TERM, layout.FIRST_POSE
-        record, situation = layout.FIRST_RECORD, layout.FIRST_SITUATION
+        Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
+        """
+        row: Any = reports if reports.ndim > 1 else reports.tolist()
+        columns = reports.T
         return {
             "position_error": row[3],
-            "heading_error": row[layout.HEADING_SIN],
-            "reward_terms": {name: row[terms + i] for i, name in enumerate(self.plan.terms)},
-            "torque": rows(layout.FIXED_REPORT_ROWS, len(row)),
-            "power": row[record],
+            "heading_error": row[HEADING_SIN],
+            "reward_terms": dict(zip(self.plan.terms, row[_TERMS], strict=False)),
+            "torque": columns[_TORQUES],
+            "power": row[FIRST_RECORD],
             "traction_use": row[6],
             "conditioning": row[7],
-            "pose": rows(pose, pose + 4),
-            "reference_pose": rows(pose + 4, pose + 8),
-            "progress": row[situation],
-            "progress_share": row[situation + 1],
-            "clearance": row[situation + 2],
-            "impacts": row[record + 6],
-            "impulse": rows(record + 1, record + 3),
-            "normal_impulse": row[record + 3],
+            "pose": columns[_POSE],
+            "reference_pose": columns[_REFERENCE_POSE],
+            "progress": row[FIRST_SITUATION],
+            "progress_share": row[FIRST_SITUATION + 1],
+            "clearance": row[FIRST_SITUATION + 2],
+            "impacts": row[FIRST_RECORD + 6],
+            "impulse": columns[_IMPULSE],
+            "normal_impulse": row[FIRST_RECORD + 3],
             "left_corridor": row[0] > 0.0,
             "not_finite": row[1] > 0.0,
             "touched": row[2] > 0.0,
@@ -255,27 +277,27 @@ class TaskEngine:
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
         state = self.states[robot]
-        report = self._reports[:, robot]
+        report = self._reports.reshape(self._report_rows, -1)[:, robot]
         path = int(self._world.clocks[1, robot])
         near, end = self.plan.arenas[path]
-        record = report[layout.FIRST_RECORD :]
+        record = report[FIRST_RECORD:]
         return Scene(
             robot=self.robot,
             time=float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
             pose=state[:4],
             twist=state[4:7],
             directions=state[7:].reshape(-1, 2),
-            torque=report[layout.FIXED_REPORT_ROWS :].copy(),
-            ground_forces=self._ground_forces(state, report[layout.FIXED_REPORT_ROWS :]),
+            torque=report[FIXED_REPORT_ROWS:].copy(),
+            ground_forces=self._ground_forces(state, report[FIXED_REPORT_ROWS:]),
             path=self.plan.tables[path][:, :2],
             corridor=self._pace.corridor,
-            reference=report[layout.FIRST_POSE + 4 : layout.FIRST_POSE + 8].copy(),
+            reference=report[FIRST_POSE + 4 : FIRST_POSE + 8].copy(),
             obstacles=self.plan.around.obstacles._replace(
                 radii=self.plan.around.obstacles.radii[near:end], spans=self.plan.around.obstacles.spans[near:end]
             ),
             impulse=record[1:3].copy(),
             impact_point=record[4:6].copy() if record[6] > 0.0 else np.full(2, np.nan),
-            failed=bool(report[: layout.ENDINGS].any()),
+            failed=bool(report[:ENDINGS].any()),
         )
 
     def _ground_forces(self, state: NDArray[np.float64], torque: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,12 +20,12 @@ from caster_gym.envs.block_layout import (
     Sizes,
     Views,
     World,
-    block_rows,
     command_row,
     desk_rows,
     nearest_row,
     observation_row,
     parameter_row,
+    parameter_rows,
     progress_row,
     record_row,
     reference_row,
@@ -64,6 +64,7 @@ def _borrowed_arenas(arenas: Any) -> Any:
 def _borrowed_world(w: World) -> World:
     return World(
         borrowed(w.blocks),
+        borrowed(w.parameters),
         borrowed(w.clocks),
         borrowed(w.seeds),
         borrowed(w.slots),
@@ -257,12 +258,10 @@ def _insert(desk: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: S
 
 @register_jitable(**INLINE)
 def _step_lanes(
-    i: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes
+    first: Any, lanes: Any, look: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes
 ) -> None:
-    """One control period of the robots of block i, of which `look` observes as many as there are lanes."""
-    first = i * LANES
+    """One control period of the robots on the desk, `first` the first; `look` observes as many as there are lanes."""
     here = min(lanes, len(actions) - first)
-    copy_rows(world.blocks[i], desk, 0, lanes, block_rows(sizes))
     row = command_row(sizes)
     for j in range(2 * len(sizes.casters)):
         slot = world.slots[j]
@@ -272,7 +271,6 @@ def _step_lanes(
     for lane in range(here):
         world.clocks[0, first + lane] += 1
         _fetch(desk, lane, first + lane, world, sizes)
-    copy_rows(desk, world.blocks[i], 0, lanes, parameter_row(sizes))
     look(desk, world.guide, sizes)
     deliver(desk, 0, here, first, views, sizes)
     give_results(desk, here, first, world, views, sizes)
@@ -292,9 +290,21 @@ def _look_at_one(desk: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
     _look(desk, lane, 1, guide, sizes)
 
 
+@register_jitable(**INLINE)
+def _take_parameters(block: Any, lane: Any, lanes: Any, desk: Any, world: World, sizes: Sizes) -> None:
+    """Put the parameters of a block's robots, of all lanes or one, on the desk."""
+    shared = len(world.parameters) == 1
+    source = world.parameters[0 if shared else block]
+    copy_rows(source, desk, lane, lanes, parameter_rows(sizes), parameter_row(sizes))
+
+
 def _step_block(i: Any, world: World, actions: Any, views: Views, desk: Any, sizes: Sizes) -> None:
     world, views, desk = _borrowed_world(world), _borrowed_views(views), borrowed(desk)
-    _step_lanes(i, LANES, _look_at_all, world, actions, views, desk, sizes)
+    copy_rows(world.blocks[i], desk, 0, LANES, parameter_row(sizes), 0)
+    if len(world.parameters) > 1:
+        _take_parameters(i, 0, LANES, desk, world, sizes)
+    _step_lanes(i * LANES, LANES, _look_at_all, world, actions, views, desk, sizes)
+    copy_rows(desk, world.blocks[i], 0, LANES, parameter_row(sizes), 0)
 
 
 @register_jitable(**INLINE)
@@ -307,12 +317,12 @@ def _one_column(numbers: Any) -> Any:
     return borrowed(numbers).reshape((len(numbers), 1))
 
 
-def _step_single(held: Any, action: Any, observation: Any, report: Any, results: Any, sizes: Sizes) -> bool:
-    """One control period of a single robot; nothing happens, and False comes back, if the action is not a number."""
+def _step_single(held: Any, action: Any, observation: Any, report: Any) -> bool:
+    """One control period of a robot that lives on its desk; if the action is not a number, False and nothing else."""
     for i in range(len(action)):
         if action[i] != action[i]:
             return False
-    world, desk = held.content
+    world, desk, results, sizes = held.content
     world, desk = _borrowed_world(world), borrowed(desk)
     views = Views(_one_row(observation), _one_column(report), _one_column(results))
     _step_lanes(0, 1, _look_at_first, world, _one_row(action), views, desk, sizes)
@@ -321,6 +331,7 @@ def _step_single(held: Any, action: Any, observation: Any, report: Any, results:
 
 def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
     desk = np.zeros(desk_rows(sizes) * LANES)  # of this thread; lanes without a robot hold numbers too
+    _take_parameters(0, 0, LANES, desk, _borrowed_world(world), sizes)
     for i in range(first, end):
         step_block(i, world, actions, views, desk, sizes)
 
@@ -337,7 +348,8 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
     for i in range(len(selected)):
         robot = selected[i]
         block, lane = world.blocks[robot // LANES], robot % LANES
-        copy_rows(block, desk, lane, 1, block_rows(sizes))
+        copy_rows(block, desk, lane, 1, parameter_row(sizes), 0)
+        _take_parameters(robot // LANES, lane, 1, desk, world, sizes)
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
@@ -359,7 +371,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         for row in range(command_row(sizes), reference_row(sizes)):
             desk[row * LANES + lane] = 0.0
         _fetch(desk, lane, robot, world, sizes)
-        copy_rows(desk, block, lane, 1, parameter_row(sizes))
+        copy_rows(desk, block, lane, 1, parameter_row(sizes), 0)
         look_at_one(desk, lane, world.guide, sizes)
         deliver(desk, lane, 1, robot, views, sizes)
 
