@@ -283,7 +283,7 @@ def _look_at_all(desk: Any, guide: Any, sizes: Sizes) -> None:
 
 @register_jitable(**INLINE)
 def _look_at_first(desk: Any, guide: Any, sizes: Sizes) -> None:
-    look_at_one(desk, 0, guide, sizes)
+    look_at_one(desk, np.int64(0), guide, sizes)  # a literal 0 would be compiled anew
 
 
 def _look_at_one(desk: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
