@@ -1,6 +1,7 @@
 """Many robots at once as a Gymnasium VectorEnv, whatever their task: one compiled call a step."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -167,22 +168,16 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
 
 def _masked(infos: dict[str, Any], mask: Flags) -> dict[str, Any]:
     """Infos with a mask `_key` beside each key, the same for all, as Gymnasium's vector environments give them."""
-    result: dict[str, Any] = {}
+    result = infos | dict.fromkeys(_mask_names(tuple(infos)), mask)
     for key, value in infos.items():
-        result[key] = _masked(value, mask) if isinstance(value, dict) else value
-        result[_MASK_OF[key]] = mask
+        if isinstance(value, dict):
+            result[key] = _masked(value, mask)
     return result
 
 
-class _MaskNames(dict[str, str]):
-    """The names of masks, each made once."""
-
-    def __missing__(self, key: str) -> str:
-        self[key] = name = f"_{key}"
-        return name
-
-
-_MASK_OF = _MaskNames()
+@cache
+def _mask_names(keys: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"_{key}" for key in keys)
 
 
 def check_counts(num_envs: int, max_episode_steps: int | None) -> None:
