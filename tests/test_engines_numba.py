@@ -15,7 +15,7 @@ from caster_gym import Model, load_robot
 from caster_gym.engines import numba_compiler, numba_fleet
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.threads import BLOCKS_PER_THREAD
+from caster_gym.engines.threads import BLOCKS_PER_SHARE
 from caster_gym.engines.torch_model import TorchModel
 from tests.random_robots import random_robot
 
@@ -98,7 +98,7 @@ def test_one_robot_alone_equals_the_same_robot_in_a_batch():
 def test_batches_on_one_and_on_several_threads_are_equal():
     """To the last bit: a small batch runs on one thread, a large one on all of them."""
     few = 3 * LANES + 5
-    assert block_count(few) < 2 * BLOCKS_PER_THREAD <= block_count(MANY)
+    assert block_count(few) < 2 * BLOCKS_PER_SHARE <= block_count(MANY)
     robots, (_, directions), torques = different_robots(MANY), random_states(4, MANY), random_torques(4, MANY)
     large, small = Fleet(robots), Fleet(robots[:few])
     large.state, small.state = directions, directions[:few]

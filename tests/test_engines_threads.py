@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from caster_gym.engines.threads import BLOCKS_PER_THREAD, get_threads, over_blocks, set_threads
+from caster_gym.engines.threads import BLOCKS_PER_SHARE, get_threads, over_blocks, set_threads
 
 
 @pytest.fixture(params=[1, 2])
@@ -18,7 +18,7 @@ def threads(request):
     set_threads(before)
 
 
-@pytest.mark.parametrize("blocks", [1, 2 * BLOCKS_PER_THREAD - 1, 2 * BLOCKS_PER_THREAD, 101])
+@pytest.mark.parametrize("blocks", [1, 2 * BLOCKS_PER_SHARE - 1, 2 * BLOCKS_PER_SHARE, 101])
 def test_every_block_is_done_once(threads, blocks):
     done = [0] * blocks
 
@@ -63,7 +63,7 @@ def test_stepping_a_batch_leaves_the_pool_of_numba_asleep():
 
 def test_few_blocks_stay_in_the_calling_thread(threads):
     names = []
-    over_blocks(lambda first, end: names.append(threading.current_thread().name), 2 * BLOCKS_PER_THREAD - 1)
+    over_blocks(lambda first, end: names.append(threading.current_thread().name), 2 * BLOCKS_PER_SHARE - 1)
     assert names == [threading.current_thread().name]
 
 

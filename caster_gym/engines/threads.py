@@ -8,9 +8,11 @@ pool is left alone: waking it would change the number of threads that Torch uses
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
-BLOCKS_PER_THREAD = 4  # least, since waking a thread costs about as much as stepping so many blocks
+BLOCKS_PER_SHARE = 4  # least, since waking a thread costs about as much as stepping so many blocks
+SHARES_PER_THREAD = 4  # a thread that wakes late, or beside a busy process, leaves more of them to the others
 
 _count = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
 _pool: ThreadPoolExecutor | None = None
@@ -33,16 +35,23 @@ def set_threads(count: int) -> None:
 
 
 def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> None:
-    """function(first, end, *arguments) for ranges that cover all blocks, one range a thread."""
-    threads = min(_count, blocks // BLOCKS_PER_THREAD)
-    if threads < 2:
+    """function(first, end, *arguments) for ranges that cover all blocks; threads take one after the other."""
+    shares = min(_count * SHARES_PER_THREAD, blocks // BLOCKS_PER_SHARE)
+    if _count < 2 or shares < 2:
         function(0, blocks, *arguments)
         return
-    bounds = [blocks * i // threads for i in range(threads + 1)]
-    others = [_threads().submit(function, bounds[i], bounds[i + 1], *arguments) for i in range(1, threads)]
-    function(bounds[0], bounds[1], *arguments)
+    bounds = [blocks * i // shares for i in range(shares + 1)]
+    untaken = iter(pairwise(bounds))
+
+    def work() -> None:
+        for first, end in untaken:
+            function(first, end, *arguments)
+
+    others = [_threads().submit(work) for _ in range(min(_count, shares) - 1)]
+    work()
     for other in others:
-        other.result()
+        if not other.cancel():
+            other.result()
 
 
 def _threads() -> ThreadPoolExecutor:
