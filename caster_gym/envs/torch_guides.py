@@ -32,7 +32,7 @@ class TorchTimetable:
     """Trajectories run by the clock."""
 
     def __init__(self, guide: Timetable, dtype: torch.dtype, device: torch.device) -> None:
-        self.samples = torch.as_tensor(guide.samples, dtype=dtype, device=device)
+        self.samples = torch.as_tensor(guide.samples, dtype=dtype, device=device).T.contiguous()  # (10, rows)
         self.spans = torch.as_tensor(guide.spans, device=device)
         self.weights = Weights(*_weights(guide.weights, dtype, device))
         self._horizons = tuple(guide.horizons.tolist())
@@ -40,17 +40,17 @@ class TorchTimetable:
     def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
         """Reference and preview at the robots' clocks."""
         first, last = self.spans[path, 0], self.spans[path, 1]
-        reference = Reference(*self.samples[torch.minimum(first + clock, last)].unbind(1))
-        rows = [self.samples[torch.minimum(first + clock + ahead, last)] for ahead in self._horizons]
+        reference = Reference(*self.samples[:, torch.minimum(first + clock, last)].unbind(0))
+        rows = [self.samples[:POINT_ROWS, torch.minimum(first + clock + ahead, last)] for ahead in self._horizons]
         none = torch.zeros_like(before)
-        return Guidance(reference, tuple(cast(Point, row.unbind(1)[:POINT_ROWS]) for row in rows), none, none)
+        return Guidance(reference, tuple(cast(Point, row.unbind(0)) for row in rows), none, none)
 
 
 class TorchCourses:
     """Paths walked at the robots' own pace."""
 
     def __init__(self, guide: Courses, dtype: torch.dtype, device: torch.device) -> None:
-        self.samples = torch.as_tensor(guide.samples, dtype=dtype, device=device)
+        self.samples = torch.as_tensor(guide.samples, dtype=dtype, device=device).T.contiguous()  # (10, rows)
         self.spans = torch.as_tensor(guide.spans, device=device)
         self.weights = FollowWeights(*_weights(guide.weights, dtype, device))
         self._guide = guide
@@ -76,7 +76,7 @@ class TorchCourses:
         return Guidance(reference, tuple(preview), progress, share)
 
     def _row(self, i: Tensor) -> Row:
-        return cast(Row, self.samples[i].unbind(1))
+        return cast(Row, self.samples[:, i].unbind(0))
 
     def _nearest(self, state: State, path: Tensor, before: Tensor) -> Tensor:
         """Arc length of the point nearest to each robot, from `before` to a window ahead. [m]"""
@@ -88,8 +88,8 @@ class TorchCourses:
             rows = first[:, None] + self._widest
             within = rows < end[:, None]
             rows = torch.minimum(rows, last[:, None] - 1)
-            ax, ay = self.samples[rows, 0], self.samples[rows, 1]
-            bx, by = self.samples[rows + 1, 0] - ax, self.samples[rows + 1, 1] - ay
+            ax, ay = self.samples[0, rows], self.samples[1, rows]
+            bx, by = self.samples[0, rows + 1] - ax, self.samples[1, rows + 1] - ay
             wx, wy = x[:, None] - ax, y[:, None] - ay
             shares = clip((wx * bx + wy * by) / (bx * bx + by * by), 0.0, 1.0)
             distance = (wx - shares * bx) ** 2 + (wy - shares * by) ** 2

@@ -19,17 +19,17 @@ from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.plant import guarded_driven_step
-from caster_gym.mechanics.scalars import Vector, each, flatten, pairs, where
+from caster_gym.mechanics.scalars import each, flatten, pairs, where
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance, separation
 
 _FAR = 1e6  # [m] where nobody comes
 
 
 class Given(NamedTuple):
-    """What drives the robots during a control period, and what they are; tensors (robots,), or numbers for all."""
+    """What drives the robots during a control period, and what they are: numbers for all, or tensors (robots,)."""
 
-    commands: tuple[Tensor, ...]
-    push: Vector  # external wrench at C, in B [N, N, N m]
+    commands: Tensor  # (2 N, robots), −1 … 1
+    push: Tensor  # (3, robots) external wrench at C, in B [N, N, N m]
     robot: RobotParameters
 
 
@@ -140,11 +140,12 @@ class TorchSurroundings:
         if not len(near):
             return bodies, record, room
         n = 2 * len(given.robot.casters)
-        commands, push, robot = (_of(near, part) for part in given)
+        commands, (x, y, z) = given.commands[:, near].unbind(0), given.push[:, near].unbind(0)
+        robot = pytree.tree_map_only(Tensor, lambda one: one[near], given.robot)
         obstacles = self.beside(paths[near])
         state = unpack_state(bodies[:, near].unbind(0))
         end, drive, touch = guarded_driven_step(
-            state, pairs(commands), push, h, robot, self.hull, obstacles, 0, len(self._spans)
+            state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans)
         )
         done, hit = Record(*record[n:, near].unbind(0)), touch.impacts > 0.0
         happened = Record(
@@ -185,8 +186,3 @@ def _slots(listed: list[list[tuple[int, tuple[bool, bool, bool]]]]) -> list[list
 def _entries(table: Tensor, paths: Tensor) -> list[list[Tensor]]:
     """Numbers of a table (rows, paths, columns) as tensors (robots,)."""
     return [list(row.unbind(1)) for row in table[:, paths].unbind(0)]
-
-
-def _of(near: Tensor, part: Any) -> Any:
-    """The entries of some robots in nested tuples of tensors (robots,) and of numbers that hold for all."""
-    return pytree.tree_map_only(Tensor, lambda one: one[near], part)

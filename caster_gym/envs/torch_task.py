@@ -14,6 +14,7 @@ from torch import Tensor
 from caster_gym.engines.guarding import settled
 from caster_gym.engines.torch_compiler import compiled
 from caster_gym.engines.torch_fleet import BODY_ROWS
+from caster_gym.engines.torch_motion import driven_rows
 from caster_gym.engines.torch_scalars import check_memory, checked_device, checked_dtype
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs.guides import judge
@@ -34,10 +35,9 @@ from caster_gym.envs.tracking import (
     report,
     start,
 )
-from caster_gym.mechanics.integration import State, difference, pack_state, unpack_state
+from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
-from caster_gym.mechanics.plant import driven_step
-from caster_gym.mechanics.scalars import Direction, Scalar, add, each, flatten, pairs, sqrt, total
+from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, total
 
 TaskName: TypeAlias = Literal["track", "follow"]
 
@@ -123,13 +123,19 @@ class TorchTask:
         self.parameters: RobotParameters = robot_parameters(self.robot)
         self._guide = torch_guide(self.engine.plan.guide, self.dtype, self.device)
         self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
+        # plain numbers, since what is reached through other objects is looked up anew before each compiled call
+        self._joints, self._substeps, self._h = 2 * self.robot.caster_count, self.task.substeps, self.task.time_step
+        self._start_offset, self._start_turn = self.task.start_offset, self.task.start_turn
+        self._paths, self._nearest = len(self.engine.plan.names), self.layout.nearest
         driven = self.robot.driven
         self._slots = tuple(driven.index(joint) if joint in driven else -1 for joint in self.robot.joints)
+        self._compiled = compile
+        self.graphs = compile and graphs and self._around is None  # obstacles wait for the device
         self._move, self._look, self._place = self._moved, self._looked, self._placed
         if compile:
-            self._move = compiled(self._moved, self.device, graphs)
-            self._look = compiled(self._looked, self.device, graphs)
-            self._place = compiled(self._placed, self.device, graphs)
+            self._move = compiled(self._moved, self.device, self.graphs)
+            self._look = compiled(self._looked, self.device, self.graphs)
+            self._place = compiled(self._placed, self.device, self.graphs)
 
     def begin(self, keys: Tensor, path: Tensor | int = DRAW_A_PATH) -> tuple[TaskState, TaskOutcome]:
         """First episodes of robots with the given keys, int64 (robots,); path: index for each, or drawn."""
@@ -156,16 +162,19 @@ class TorchTask:
         wrench (robots, 3): external, at C, in B [N, N, N m].
         """
         commands = self._commands(actions, len(state.clocks))
-        none = torch.zeros_like(commands[0])
-        (doubt,) = total(each(difference, (), commands))
-        forces = (none, none, none) if wrench is None else wrench.to(self.dtype).unbind(1)
-        push = add(tuple(forces), (doubt, doubt, doubt))
+        doubt = (commands - commands).sum(0)  # not a number where a command is none
+        push = doubt.expand(3, -1) if wrench is None else doubt + wrench.to(self.dtype).T
         given = Given(commands, push, self.parameters)
-        bodies, record, room = state.bodies, self._empty(self._record_rows, len(none)), state.room
-        for _ in range(self.task.substeps):
-            bodies, record, room = self._move(bodies, record, room, given)
+        if commands.requires_grad:
+            state = self._differentiable(state)
+        bodies, room = state.bodies, state.room
+        record = self._empty(self._record_rows, len(doubt)).requires_grad_(bodies.requires_grad)
+        h, substeps = self.task.time_step, self.task.substeps
+        at_once = substeps if self._around is None and not bodies.requires_grad else 1  # a gradient compiles for long
+        for _ in range(0, substeps, at_once):
+            bodies, record, room = self._move(bodies, record, room, given, at_once)
             if self._around is not None:
-                h, share = self.task.time_step, 1.0 / self.task.substeps
+                share = 1.0 / substeps
                 bodies, record, room = self._around.careful_step(bodies, record, room, given, state.paths, h, share)
         clocks = state.clocks + 1
         outcome, progress, room = self._look(bodies, record, clocks, state.paths, state.progress, self.parameters)
@@ -181,8 +190,8 @@ class TorchTask:
         again = outcome.ended if where is None else where
         fresh, first = self._start(state, torch.as_tensor(path, device=self.device).expand(len(again)))
         merged = TaskState(*(torch.where(again, new, old) for new, old in zip(fresh, state, strict=True)))
-        return merged, outcome._replace(
-            observations=torch.where(again[:, None], first.observations, outcome.observations),
+        return merged, outcome._replace(  # rows of robots, whose entries lie side by side, are the fastest to choose
+            observations=torch.where(again, first.observations.T, outcome.observations.T).T,
             report=torch.where(again, first.report, outcome.report),
         )
 
@@ -199,30 +208,39 @@ class TorchTask:
     def _empty(self, rows: int, count: int) -> Tensor:
         return torch.zeros((rows, count), dtype=self.dtype, device=self.device)
 
-    def _commands(self, actions: Tensor, count: int) -> tuple[Tensor, ...]:
-        """A command in −1 … 1 for each motor, 0 where it is not driven."""
+    def _commands(self, actions: Tensor, count: int) -> Tensor:
+        """A command in −1 … 1 for each motor (2 N, robots), 0 where it is not driven."""
         if actions.shape != (count, len(self.robot.driven)):
             raise ValueError(f"actions must have shape {(count, len(self.robot.driven))}, got {tuple(actions.shape)}")
-        columns = actions.to(self.dtype).clamp(-1.0, 1.0).T.contiguous().unbind(0)  # strides would stop SIMD
-        none = torch.zeros_like(columns[0])
-        return tuple(none if slot < 0 else columns[slot] for slot in self._slots)
+        rows = actions.to(self.dtype).clamp(-1.0, 1.0).T
+        if len(self.robot.driven) == len(self._slots):
+            return rows.contiguous()  # strides would stop SIMD
+        none = torch.zeros_like(rows[0])
+        return torch.stack([none if slot < 0 else rows[slot] for slot in self._slots])
 
-    def _moved(self, bodies: Tensor, record: Tensor, room: Tensor, given: Given) -> tuple[Tensor, Tensor, Tensor]:
-        """States, records and rooms after one RK4 step; who may touch something stays, with a negative room."""
-        state, h, n = unpack_state(bodies.unbind(0)), self.task.time_step, 2 * self.robot.caster_count
-        target, drive = driven_step(state, pairs(given.commands), given.push, h, given.robot)
+    def _moved(
+        self, bodies: Tensor, record: Tensor, room: Tensor, given: Given, steps: int
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """States, records and rooms after RK4 steps; who may touch something stays, with a negative room."""
+        n = self._joints
         around = self._around
-        reach = 0.0 if around is None else around.hull.reach
-        end, room, went = settled(around, room, state, target, h, reach)
-        share = (1.0 / self.task.substeps) * (went.to(self.dtype) if isinstance(went, Tensor) else went)
-        mean = share * torch.stack((*flatten(drive.torques), drive.power))
-        return torch.stack(end), torch.cat((record[: n + 1] + mean, record[n + 1 :])), room
+        for _ in range(steps):
+            target, done = driven_rows(bodies, given.commands, given.push, self._h, given.robot)
+            share: Scalar = 1.0 / self._substeps
+            if around is None:
+                bodies = target
+            else:
+                now, aim = unpack_state(bodies.unbind(0)), unpack_state(target.unbind(0))
+                end, room, went = settled(around, room, now, aim, self._h, around.hull.reach)
+                bodies, share = torch.stack(end), share * went.to(self.dtype)
+            record = torch.cat((record[: n + 1] + share * done, record[n + 1 :]))
+        return bodies, record, room
 
     def _looked(
         self, bodies: Tensor, record: Tensor, clocks: Tensor, paths: Tensor, before: Tensor, robot: RobotParameters
     ) -> tuple[TaskOutcome, Tensor, Tensor]:
         """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start."""
-        state, n = unpack_state(bodies.unbind(0)), 2 * self.robot.caster_count
+        state, n = unpack_state(bodies.unbind(0)), self._joints
         torques, done = pairs(record[:n].unbind(0)), Record(*record[n:].unbind(0))
         guidance = self._guide.fetch(state, clocks, paths, before)
         reference = guidance.reference
@@ -248,27 +266,39 @@ class TorchTask:
     def _look_around(self, state: State, paths: Tensor) -> tuple[Tensor, tuple[Neighbour, ...]]:
         """Gap to the nearest obstacle [m], and the obstacles that the observation shows."""
         if self._around is not None:
-            return self._around.look(state, paths, self.layout.nearest)
+            return self._around.look(state, paths, self._nearest)
         none = torch.zeros_like(state.position[0])
-        return none + math.inf, ((none + GAP_LIMIT, none, none),) * self.layout.nearest
+        return none + math.inf, ((none + GAP_LIMIT, none, none),) * self._nearest
 
     def _start(self, state: TaskState, wanted: Tensor) -> tuple[TaskState, TaskOutcome]:
         """Everybody at the start of the next episode, on the wanted path or, where it is negative, a drawn one."""
         bodies, paths = self._place(state.keys, state.episodes, wanted)
         clocks, before = torch.zeros_like(state.clocks), torch.full_like(state.progress, _BEFORE)
-        nothing = self._empty(self._record_rows, len(clocks))
-        outcome, progress, room = self._look(bodies, nothing, clocks, paths, before, self.parameters)
-        return TaskState(bodies, progress, room, clocks, paths, state.keys, state.episodes + 1), outcome
+        fresh = TaskState(bodies, before, state.room, clocks, paths, state.keys, state.episodes + 1)
+        fresh = self._differentiable(fresh)
+        nothing = self._empty(self._record_rows, len(clocks)).requires_grad_(fresh.bodies.requires_grad)
+        outcome, progress, room = self._look(fresh.bodies, nothing, clocks, paths, fresh.progress, self.parameters)
+        fresh = fresh._replace(progress=progress, room=room).detached()
+        return fresh, TaskOutcome(*(tensor.detach() for tensor in outcome))
+
+    def _differentiable(self, state: TaskState) -> TaskState:
+        """The state as the compiled parts want it in all periods of a window: without a past they were other ones."""
+        if not (self._compiled and torch.is_grad_enabled()):
+            return state
+        bodies, progress = (
+            tensor if tensor.requires_grad else tensor.detach().requires_grad_()
+            for tensor in (state.bodies, state.progress)
+        )
+        return state._replace(bodies=bodies, progress=progress)
 
     def _placed(self, keys: Tensor, episodes: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
         """States at the start of an episode, and its path."""
         seed = episode_seed(keys, episodes)
-        drawn = (uniform(seed, 0) * len(self.engine.plan.names)).long()
+        drawn = (uniform(seed, 0) * self._paths).long()
         paths = torch.where(wanted < 0, drawn, wanted)
-        x, y = (((2.0 * uniform(seed, i) - 1.0) * self.task.start_offset).to(self.dtype) for i in (1, 2))
-        turn = (2.0 * uniform(seed, 3) - 1.0) * self.task.start_turn
-        count = self.robot.caster_count
-        directions = tuple(self._direction(2.0 * math.pi * uniform(seed, 4 + i)) for i in range(count))
+        x, y = (((2.0 * uniform(seed, i) - 1.0) * self._start_offset).to(self.dtype) for i in (1, 2))
+        turn = (2.0 * uniform(seed, 3) - 1.0) * self._start_turn
+        directions = tuple(self._direction(2.0 * math.pi * uniform(seed, 4 + i)) for i in range(self._joints // 2))
         none = torch.zeros_like(x)
         nowhere = State((none, none), (none, none), (none, none, none), directions)
         guidance = self._guide.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)

@@ -30,8 +30,9 @@ class TorchVectorEnv:
     where there are no obstacles, hence actions are not checked: one that is not a number ends its robot's episode as
     not finite.
 
-    compile fuses the step into few kernels; its first call then takes a minute or two, or some seconds where Torch's
-    cache on disk has it. On a CUDA device they are replayed as graphs. diagnostics: see `TorchTask`.
+    compile fuses the step into few kernels; its first call then takes half a minute to a minute, or 10 s where Torch's
+    cache on disk has it. On a CUDA device they are replayed as graphs, unless there are obstacles. On the CPU more than
+    one of Torch's threads is faster only where nothing else keeps the cores busy. diagnostics: see `TorchTask`.
     """
 
     autoreset_mode = AutoresetMode.SAME_STEP
@@ -71,7 +72,7 @@ class TorchVectorEnv:
         check_memory(num_envs, 4 * self.task.layout.size, dtype, self.device)
         self.single_observation_space = observation_space(self.task.engine)
         self.single_action_space = action_space(self.task.engine)
-        self._advance = replayed(self._advanced) if graphs else self._advanced
+        self._advance = replayed(self._advanced) if self.task.graphs else self._advanced
         self._now: tuple[TaskState, TaskOutcome] | None = None
 
     def reset(
@@ -137,6 +138,8 @@ class TorchVectorEnv:
 
     def _advanced(self, state: TaskState, actions: Tensor) -> tuple[TaskState, TaskOutcome, TaskOutcome]:
         state, final = self.task.step(state, actions)
+        if self.device.type == "cpu" and not bool(final.ended.any()):  # another device would be waited for
+            return state, final, final
         state, outcome = self.task.restart(state, final)
         return state, final, outcome
 
