@@ -20,6 +20,8 @@ from scripts.speed_timing import RATE, Row, Work, at_least, at_most, rate
 TRACK, FOLLOW = "caster_gym:CasterTrack-v0", "caster_gym:CasterFollow-v0"
 COURSES = {"shape": "random_paths", "count": 16, "reversing": 0.0, "min_radius": 0.15}
 WIDE = 20.0  # [m] corridor that random actions do not leave, so that episodes end by time
+CIRCLES = tuple({"shape": "circle", "radius": 0.5, "duration": 5.0 + 0.46 * k} for k in range(16))  # end at any time
+SCATTERING = 400  # control periods after which robots on these circles end their episodes one by one
 ACTION = 0.1  # [-] random actions and torques, as shares of the greatest torques
 SPEED = 0.5  # [m/s, rad/s] standard deviation of the random motions at the start
 RK4_STEP = 0.005  # [s] the environments' own
@@ -88,11 +90,19 @@ def drawn_actions(space: Any) -> Any:
     return np.random.default_rng(0).uniform(-ACTION, ACTION, (times, *space.shape)).astype(np.float32)
 
 
-def batch(robot: str, count: int, name: str = TRACK, **options: Any) -> Work:
+def batch(robot: str, count: int, name: str = TRACK, path: Any = CIRCLES, **options: Any) -> Work:
     """The native batch, with observations, rewards, infos and resets."""
-    environment = gym.make_vec(name, num_envs=count, robot=robot, corridor=WIDE, **options)
+    environment = gym.make_vec(name, num_envs=count, robot=robot, path=path, corridor=WIDE, **options)
     environment.reset(seed=0)
-    return cycled(environment.step, drawn_actions(environment.action_space), count)
+    work = cycled(environment.step, drawn_actions(environment.action_space), count)
+    scatter(work)
+    return work
+
+
+def scatter(work: Work) -> None:
+    """Step until episodes end at different times, as they do in training."""
+    for _ in range(SCATTERING):
+        work.call()
 
 
 def engine(robot: str, count: int) -> Work:

@@ -9,7 +9,7 @@ import torch
 from caster_gym import Robot
 from caster_gym.engines.torch_fleet import TorchFleet
 from caster_gym.envs.torch_vector_env import TorchVectorEnv
-from scripts.speed_robots import ACTION, BANK, RK4_STEP, SPEED, WIDE, limits
+from scripts.speed_robots import ACTION, BANK, CIRCLES, RK4_STEP, SCATTERING, SPEED, WIDE, limits
 from scripts.speed_timing import RATE, Row, Work, rate
 
 EXCERPT = 400  # RK4 steps of a motion
@@ -40,7 +40,9 @@ def bare_tensors(robot: Robot, count: int, device: str) -> Work:
 
 def environment_tensors(robot: str, count: int, device: str) -> Work:
     """Steps of a whole batch in float32, with observations, rewards, infos (but for diagnostics) and resets."""
-    environment = TorchVectorEnv("track", count, robot, device=device, compile=True, diagnostics=False, corridor=WIDE)
+    environment = TorchVectorEnv(
+        "track", count, robot, CIRCLES, device=device, compile=True, diagnostics=False, corridor=WIDE
+    )
     environment.reset(seed=0)
     times = max(2, min(BANK, 2**18 // count))
     shape = (times, count, *(environment.single_action_space.shape or ()))
@@ -53,6 +55,8 @@ def environment_tensors(robot: str, count: int, device: str) -> Work:
         finish(device)
         return STEPS_A_CALL * count
 
+    for _ in range(SCATTERING // STEPS_A_CALL):
+        call()
     return Work(call)
 
 
