@@ -45,7 +45,7 @@ def sections(robot: Robot, name: str, cores: int, seconds: float, quick: bool) -
             "Whole environments",
             """A control period of 20 ms: RK4 substeps, observation, reward, infos and, where an episode has ended, the
             reset. Actions are random, up to a tenth of the greatest torques, and the corridor is wide, so that episodes
-            end by time: after 5 to 12 s, so that in batches somebody's ends in nearly every step. Following is
+            end by time: after 6 to 13 s, so that in batches somebody's ends in nearly every step. Following is
             CasterFollow-v0 on random paths.""",
             environment_rows(name, cores, seconds),
         ),

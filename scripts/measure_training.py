@@ -1,20 +1,22 @@
-"""How fast policies are trained, in one table: python -m scripts.measure_training
+"""How fast policies are trained: python -m scripts.measure_training --out docs/training.md
 
 First, what simulation costs PPO: control periods per second of training on our robots and on robots that cost nothing,
 which answer with arrays of the same shapes drawn beforehand; turn by turn, so that a busy moment hits both. Then, how
-long each learner takes until its policy follows validation paths as well as asked, all in the same run.
+long each learner takes until its policy follows validation paths as well as asked, all in the same run. The command
+writes a page, and a figure and a table in a folder beside it.
 """
 
 import argparse
 import os
-import platform
+import resource
 import shlex
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,36 +25,30 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 from tqdm import tqdm
 
-from caster_gym.agents.benchmark import read_history
+from caster_gym.agents.actor import Actor
 from caster_gym.agents.evaluation import bare, training_batch
-from caster_gym.agents.metrics import in_words
-from caster_gym.agents.provenance import versions
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.settings import (
     ComputedTorqueSettings,
     LearnedSettings,
     PPOSettings,
+    RslPPOSettings,
+    SHACSettings,
     TaskSettings,
     read_agent,
     read_settings,
 )
-from caster_gym.agents.track_metrics import TrackVerdict
-from caster_gym.agents.training import Validation, make_learner, train
+from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_task
+from caster_gym.agents.training import Run, learn_with_sb3, make_learner
 from caster_gym.engines.threads import set_threads
-from scripts.speed_timing import RATE, Ratio, Row, Values, at_least, middle, run, shown, spread
+from scripts.speed_timing import RATE, Row, middle, run
+from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, WindowCosts, write_page
 
 BANK = 64  # steps drawn beforehand
 GOAL = 5e-3  # [m] position RMSE on validation paths
-OURS, FREE = "PPO on our robots", "PPO on robots that cost nothing"
-SHARE = Ratio("share of a zero-cost environment's speed", OURS, FREE, 100.0, at_least(95.0))
-NOTES = """\
-A turn is one round of PPO, collecting and updating, with the settings of `ppo`, on one core, in seconds of the
-processor, so that other work on the machine does not count. Robots that cost nothing
-have the same number, shapes and lengths of episodes; what they answer was drawn beforehand. Times to the goal are those
-of training on one core, from the first step to the validation that first meets it without a failure, compilation
-included and validations left out; policies are validated as often as their settings say, so that times are rounded up
-to the next validation.
-"""
+VALIDATIONS = 50  # of each run, evenly spread, so that times to the goal can be told apart
+WINDOWS = 30  # of which the medians are taken
+ROUNDS = 3  # likewise
 
 
 class FreeVecEnv(VecEnv):
@@ -108,13 +104,60 @@ class FreeVecEnv(VecEnv):
         return super()._get_indices(indices)
 
 
-class Success(NamedTuple):
-    """When a training run first met the goal; None if it never did."""
+class TimedRun(Run):
+    """A training run that counts seconds of the processor, those of validations left out."""
 
-    learner: str
-    seed: int
-    first: Validation | None
-    best: Validation
+    def __init__(
+        self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, bar: "tqdm[Any]"
+    ) -> None:
+        super().__init__(folder, task, settings, seed, lambda steps, verdict: _show(bar, steps, verdict))
+        self.points: list[Point] = []
+        self._begun, self._aside = processor_seconds(), 0.0
+
+    def validate(self, actor: Actor) -> None:
+        """As always, with the clock stopped."""
+        now = processor_seconds()
+        super().validate(actor)
+        self.points.append(Point(self.steps, now - self._begun - self._aside, self.history[-1].verdict))
+        self._aside += processor_seconds() - now
+
+
+def _show(bar: "tqdm[Any]", steps: int, verdict: str) -> None:
+    bar.update(min(steps, bar.total) - bar.n)
+    bar.set_postfix_str(verdict)
+
+
+def processor_seconds() -> float:
+    """Seconds of the processor for this process, all its threads, and the compilers that it has run."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+@contextmanager
+def empty_cache() -> Iterator[None]:
+    """Torch finds nothing that it has compiled before, and compiles in this process, where its time is counted."""
+    from torch._inductor import config
+
+    kept = os.environ.get("TORCHINDUCTOR_CACHE_DIR")
+    with tempfile.TemporaryDirectory() as folder, config.patch(compile_threads=1):
+        os.environ["TORCHINDUCTOR_CACHE_DIR"] = folder
+        try:
+            yield
+        finally:
+            del os.environ["TORCHINDUCTOR_CACHE_DIR"]
+            if kept is not None:
+                os.environ["TORCHINDUCTOR_CACHE_DIR"] = kept
+
+
+def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
+    """PPO on our robots and on free ones, with the same settings."""
+    ours = CasterVecEnv(training_batch(task, settings.robots))
+    longest = round(float(np.mean(bare(ours.batch).engine.plan.guide.spans[:, 2])))
+    free, round_ = FreeVecEnv(ours, longest), settings.robots * settings.horizon
+    return [
+        Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))
+        for key, environment in ((OURS, ours), (FREE, free))
+    ]
 
 
 def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
@@ -132,118 +175,112 @@ def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
     return measure
 
 
-def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
-    """PPO on our robots and on free ones, with the same settings."""
-    ours = CasterVecEnv(training_batch(task, settings.robots))
-    longest = round(float(np.mean(bare(ours.batch).engine.plan.guide.spans[:, 2])))
-    free, round_ = FreeVecEnv(ours, longest), settings.robots * settings.horizon
-    return [
-        Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))
-        for key, environment in ((OURS, ours), (FREE, free))
-    ]
+def train_timed(name: str, task: TaskSettings, settings: LearnedSettings, seed: int) -> Course:
+    """Train to the end of the settings, as in a process of its own: what Torch has compiled it gets from the disk."""
+    torch.compiler.reset()
+    with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.steps, desc=f"{name}, seed {seed}") as bar:
+        timed = TimedRun(Path(folder), task, settings, seed, bar)
+        way_of_learning(settings)(timed, settings)
+        timed.logger.close()
+    return Course(name, seed, tuple(timed.points))
 
 
-def time_to_goal(name: str, task: TaskSettings, settings: LearnedSettings, seed: int, goal: float) -> Success:
-    """Train to the end of the settings; a second is one of training, compilation included, validations left out."""
-    with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.steps, desc=name, file=sys.stderr) as bar:
+def way_of_learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:
+    """Who learns with such settings."""
+    if isinstance(settings, SHACSettings):
+        return learn_through_simulator
+    if isinstance(settings, RslPPOSettings):
+        from caster_gym.agents.rsl_rl import learn_with_rsl_rl
 
-        def report(steps: int, verdict: str) -> None:
-            bar.update(min(steps, settings.steps) - bar.n)
-            bar.set_postfix_str(verdict)
-
-        best = train(task, settings, seed, Path(folder), report, threads=1)
-        history = read_history(Path(folder), TrackVerdict)
-    reached = (one for one in history if not one.verdict.failures and one.verdict.position_rmse < goal)
-    return Success(name, seed, next(reached, None), best)
+        return learn_with_rsl_rl
+    return learn_with_sb3
 
 
-def share_lines(rows: Sequence[Row], measured: Values) -> list[str]:
-    """The table of training speeds, and the share."""
-    lines = ["| what | median | middle half |", "|---|---|---|"]
-    for row in rows:
-        values = measured[row.key]
-        lines.append(f"| {row.name} | {shown(middle(values))} {row.unit} | {spread(values)} |")
-    shares = SHARE.values(measured)
-    verdict = "reached" if SHARE.goal and SHARE.goal.reached(middle(shares)) else "missed"
-    lines.append(f"| {SHARE.name} (goal {SHARE.goal}: {verdict}) | {shown(middle(shares))} % | {spread(shares)} |")
-    return lines
+def window_costs(task: TaskSettings, settings: SHACSettings) -> WindowCosts:
+    """What a window of SHAC costs, and what it costs to compile its step, from nothing and from the disk."""
+    learner, compiling = _first_window(task, settings)
+    spent = []
+    for _ in range(WINDOWS):
+        times = [time.process_time()]
+        gain, window = learner.gain()
+        times.append(time.process_time())
+        torch.autograd.backward(-gain)
+        times.append(time.process_time())
+        learner.teach_critic(window)
+        times.append(time.process_time())
+        spent.append(np.diff(times))
+    forward, backward, critic = np.median(spent, axis=0).tolist()
+    torch.compiler.reset()
+    _, fetching = _first_window(task, settings)
+    periods = settings.robots * settings.window
+    return WindowCosts(periods, learner.task.task.substeps, forward, backward, critic, compiling, fetching)
 
 
-def success_lines(successes: Sequence[Success], goal: float) -> list[str]:
-    """The table of times to the goal."""
-    lines = [f"| learner | seed | time to {1e3 * goal:g} mm | steps to it | best of the run |", "|---|---|---|---|---|"]
-    for name, seed, first, best in successes:
-        told = f"{shown(first.seconds)} s | {first.steps:,}" if first else "not reached | "
-        lines.append(f"| {name} | {seed} | {told} | {in_words(best.verdict)} after {shown(best.seconds)} s |")
-    return lines
+def _first_window(task: TaskSettings, settings: SHACSettings) -> tuple[ShortHorizon, float]:
+    """A learner that has learned from one window, and the processor's seconds for it."""
+    begun = processor_seconds()
+    learner = ShortHorizon(make_task(task, settings), settings, seed=0)
+    learner.improve(0.0)
+    return learner, processor_seconds() - begun
+
+
+def rate_on_tensors(task: TaskSettings, settings: LearnedSettings) -> float:
+    """Control periods of training per second of the processor; the first round, which compiles, is not counted."""
+    if not isinstance(settings, RslPPOSettings):
+        raise ValueError(f"only PPO on tensors is measured without its error, got algorithm {settings.algorithm!r}")
+    round_ = settings.robots * settings.horizon
+    settings = settings.model_copy(update={"steps": (ROUNDS + 2) * round_, "validations": 1, "device": "cpu"})
+    starts: list[float] = []
+    torch.compiler.reset()
+    with tempfile.TemporaryDirectory() as folder:
+        counted = Run(Path(folder), task, settings, 0, lambda _steps, _verdict: starts.append(processor_seconds()))
+        way_of_learning(settings)(counted, settings)
+        counted.logger.close()
+    return round_ / middle(np.diff(starts)[1:])
+
+
+def read_learner(name: str, changes: Mapping[str, Any]) -> LearnedSettings:
+    """Settings of an agent that learns."""
+    if isinstance(read_agent(name), ComputedTorqueSettings):
+        raise ValueError(f"agent {name!r} does not learn, so that there is no time to measure")
+    settings = read_agent(name, changes)
+    assert not isinstance(settings, ComputedTorqueSettings)  # changes leave the algorithm as it is
+    return settings
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Measure, print the page and write it where asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Measure, and write the page or print it."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--task", default="track", help="name of a tracking task or path of its file")
     parser.add_argument("--agents", nargs="*", default=["ppo", "shac"], help="learners that are timed to the goal")
-    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
+    parser.add_argument("--tensors", nargs="*", default=["ppo_gpu"], help="learners on tensors whose rate is measured")
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--steps", type=int, help="control periods of each training run instead of the agent's own")
     parser.add_argument("--turns", type=int, default=15, help="how often the share is measured")
     parser.add_argument("--goal", type=float, default=GOAL, help="position RMSE [m] on validation paths")
-    parser.add_argument("--out", type=Path, help="file for the page")
+    parser.add_argument("--out", type=Path, default=Path("runs/training.md"), help="file for the page")
     chosen = parser.parse_args(arguments)
     task = read_settings(TaskSettings, "tasks", chosen.task)
     if task.environment != "track":
         raise ValueError(f"the goal is one of tracking, got a task of environment {task.environment!r}")
-    changes = {} if chosen.steps is None else {"steps": chosen.steps}
+    changes = {"validations": VALIDATIONS} | ({} if chosen.steps is None else {"steps": chosen.steps})
     agents = {name: read_learner(name, changes) for name in chosen.agents}
+    on_tensors = {name: read_learner(name, {}) for name in chosen.tensors}
+    ppo = read_learner("ppo", {})
+    assert isinstance(ppo, PPOSettings)
     load = os.getloadavg()[0]
     torch.set_num_threads(1)
     set_threads(1)
-    ppo = read_learner("ppo", {})
-    assert isinstance(ppo, PPOSettings)
-    rows = share_rows(task, ppo)
-    measured = run(rows, chosen.turns)
-    successes = [
-        time_to_goal(name, task, settings, seed, chosen.goal)
-        for seed in chosen.seeds
-        for name, settings in agents.items()
-    ]
+    with empty_cache():
+        measured = run(share_rows(task, ppo), chosen.turns)
+        costs = {name: window_costs(task, one) for name, one in agents.items() if isinstance(one, SHACSettings)}
+        courses = [train_timed(name, task, one, seed) for seed in chosen.seeds for name, one in agents.items()]
+        rates = {name: (one, rate_on_tensors(task, one)) for name, one in on_tensors.items()}
     given = sys.argv[1:] if arguments is None else arguments
-    text = page(
-        [*share_lines(rows, measured), "", *success_lines(successes, chosen.goal)],
-        shlex.join(["python", "-m", "scripts.measure_training", *given]),
-        (load, os.getloadavg()[0]),
-    )
-    print(text)
-    if chosen.out is not None:
-        chosen.out.write_text(text, encoding="utf-8")
-
-
-def read_learner(name: str, changes: dict[str, int]) -> LearnedSettings:
-    """Settings of an agent that learns."""
-    settings = read_agent(name, changes)
-    if isinstance(settings, ComputedTorqueSettings):
-        raise ValueError(f"agent {name!r} does not learn, so that there is no time to measure")
-    return settings
-
-
-def page(tables: Sequence[str], command: str, loads: tuple[float, float]) -> str:
-    """The results as Markdown."""
-    told = ", ".join(f"{name} {number}" for name, number in versions().items())
-    return "\n".join(
-        [
-            "# Speed of training",
-            "",
-            "Written by the command below.",
-            "",
-            *tables,
-            "",
-            NOTES,
-            f"- Command: `{command}`",
-            f"- Machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores",
-            f"- Load of the machine: {loads[0]:.1f} at the start, {loads[1]:.1f} at the end",
-            f"- Versions: {told}",
-            "",
-        ]
-    )
+    command = shlex.join(["python", "-m", "scripts.measure_training", *given])
+    occasion = Occasion(command, chosen.turns, chosen.goal, (load, os.getloadavg()[0]))
+    write_page(chosen.out, Results(agents, measured, courses, costs, rates), occasion)
+    print(chosen.out)
 
 
 if __name__ == "__main__":

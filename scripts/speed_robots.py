@@ -20,7 +20,7 @@ from scripts.speed_timing import RATE, Row, Work, at_least, at_most, rate
 TRACK, FOLLOW = "caster_gym:CasterTrack-v0", "caster_gym:CasterFollow-v0"
 COURSES = {"shape": "random_paths", "count": 16, "reversing": 0.0, "min_radius": 0.15}
 WIDE = 20.0  # [m] corridor that random actions do not leave, so that episodes end by time
-CIRCLES = tuple({"shape": "circle", "radius": 0.5, "duration": 5.0 + 0.46 * k} for k in range(16))  # end at any time
+CIRCLES = tuple({"shape": "circle", "radius": 0.5, "duration": 6.0 + 0.46 * k} for k in range(16))  # end at any time
 SCATTERING = 400  # control periods after which robots on these circles end their episodes one by one
 ACTION = 0.1  # [-] random actions and torques, as shares of the greatest torques
 SPEED = 0.5  # [m/s, rad/s] standard deviation of the random motions at the start

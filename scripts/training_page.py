@@ -1,0 +1,310 @@
+"""The page of `scripts.measure_training`: tables, a figure, and what they say."""
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from caster_gym.agents.metrics import Verdict
+from caster_gym.agents.provenance import versions
+from caster_gym.agents.settings import LearnedSettings
+from caster_gym.papers.drawing import COLOURS, new_figure
+from scripts.mujoco_peer import paragraph
+from scripts.speed_page import processor, table
+from scripts.speed_timing import RATE, Ratio, Values, at_least, middle, shown, spread
+
+OURS, FREE = "PPO on our robots", "PPO on robots that cost nothing"
+SHARE = Ratio("share of a zero-cost environment's speed", OURS, FREE, 100.0, at_least(95.0))
+HEADS = ("learner", "seed", "control periods", "processor time", "best of the run")
+LINES = (COLOURS[0], COLOURS[3], COLOURS[4], COLOURS[5])  # one for each learner
+
+
+class Point(NamedTuple):
+    """A validation of a training run."""
+
+    steps: int  # control periods so far
+    seconds: float  # of the processor so far, validations left out
+    verdict: Verdict
+
+
+class Course(NamedTuple):
+    """A training run."""
+
+    learner: str
+    seed: int
+    points: tuple[Point, ...]
+
+    def first(self, goal: float) -> Point | None:
+        """The validation that first meets the goal, a position RMSE [m], without a failure."""
+        met = (one for one in self.points if not one.verdict.failures and one.verdict.position_rmse < goal)
+        return next(met, None)
+
+    @property
+    def best(self) -> Point:
+        """The validation of the policy that is kept."""
+        return max(self.points, key=lambda one: one.verdict.merit)
+
+
+class WindowCosts(NamedTuple):
+    """Seconds of the processor that SHAC takes."""
+
+    periods: int  # of a window, all robots together
+    substeps: int  # RK4 steps in each of them
+    forward: float  # simulation, policy and rewards of a window
+    backward: float  # their gradient
+    critic: float
+    compiling: float  # and one window, on a machine that has never compiled it
+    fetching: float  # the same from then on, the compiled code being on disk
+
+
+class Results(NamedTuple):
+    """All that was measured."""
+
+    agents: Mapping[str, LearnedSettings]
+    share: Values
+    courses: Sequence[Course]
+    costs: Mapping[str, WindowCosts]
+    rates: Mapping[str, tuple[LearnedSettings, float]]  # of learners on tensors [steps/s]
+
+
+class Occasion(NamedTuple):
+    """Where and how it was measured."""
+
+    command: str
+    turns: int
+    goal: float  # [m]
+    loads: tuple[float, float]  # of the machine at the start and at the end
+
+
+def write_page(path: Path, results: Results, occasion: Occasion) -> None:
+    """The page, and a folder of its name with figure and table."""
+    folder = path.with_suffix("")
+    folder.mkdir(parents=True, exist_ok=True)
+    write_points(folder / "validations.csv", results.courses)
+    if results.courses:
+        draw(folder / "learning.png", results.courses, occasion.goal)
+    path.write_text(page(results, occasion, folder.name), encoding="utf-8")
+
+
+def page(results: Results, occasion: Occasion, folder: str) -> str:
+    """Everything as Markdown."""
+    goal = f"{1e3 * occasion.goal:g} mm"
+    parts = ["# Training speed", paragraph(_compared(results, goal))]
+    if results.courses:
+        parts += [
+            f"## Until {goal}",
+            paragraph(_verdict(results, occasion.goal)),
+            f"![Validation error over processor time and over control periods]({folder}/learning.png)",
+            paragraph(
+                """*Each line is a seed, each circle the validation that first meets the goal without a failure. A
+                robot that leaves its corridor counts with its error until then, so that errors of some 0.1 m are
+                those of policies that still fail.*"""
+            ),
+            table(HEADS, _rows(results, occasion.goal)),
+            *(_compilation(name, one, results, occasion.goal) for name, one in results.costs.items()),
+        ]
+    parts += ["## What limits each learner", _limits(results)]
+    parts += ["## How it was measured", _origin(results, occasion, folder)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _compared(results: Results, goal: str) -> str:
+    """What the page is about."""
+    text = f"""How long a learner takes to follow validation paths with a position RMSE of {goal}: 64 random paths on
+        which nothing is ever trained, always from the same starts, and not one failure. All runs took place in one
+        command, one after the other, on one core, with the settings that `caster-gym train` takes by default."""
+    if "ppo" in results.agents:
+        text += " `ppo` is Stable-Baselines3's PPO on the native batch: it learns from rewards alone."
+    if "shac" in results.agents:
+        text += """ `shac` passes the gradient of the rewards back through the simulator itself, over short windows, on
+            robots that are Torch tensors."""
+    return text
+
+
+def _rows(results: Results, goal: float) -> list[tuple[str, ...]]:
+    """A line for each run, then for each learner."""
+    lines = []
+    for name in results.agents:
+        own = [one for one in results.courses if one.learner == name]
+        for one in own:
+            first = one.first(goal)
+            told = (f"{first.steps:,}", f"{first.seconds:.1f} s") if first else ("not reached", "")
+            lines.append((name, str(one.seed), *told, _best(one)))
+        firsts = [first for one in own if (first := one.first(goal))]
+        bests = [1e3 * one.best.verdict.position_rmse for one in own]
+        steps, seconds = [one.steps for one in firsts], [one.seconds for one in firsts]
+        reached = f"{len(firsts)} of {len(own)} seeds"
+        ends = f"**{middle(bests):.2f}** ({min(bests):.2f} – {max(bests):.2f}) mm"
+        if firsts:
+            periods = f"**{shown(middle(steps))}** ({min(steps):,} – {max(steps):,})"
+            lines.append((f"**{name}**", reached, periods, f"**{middle(seconds):.1f}** ({_range(seconds)}) s", ends))
+        else:
+            lines.append((f"**{name}**", reached, "", "", ends))
+    return lines
+
+
+def _best(course: Course) -> str:
+    best, last = course.best, course.points[-1]
+    failures = f", {best.verdict.failures} failures" if best.verdict.failures else ""
+    return f"{1e3 * best.verdict.position_rmse:.2f} mm{failures}, after {best.seconds:.0f} s of {last.seconds:.0f} s"
+
+
+def _range(values: Sequence[float]) -> str:
+    return f"{min(values):.1f} – {max(values):.1f}"
+
+
+def _firsts(results: Results, goal: float) -> dict[str, list[Point]]:
+    """Of each learner whose seeds have all met the goal, where they did."""
+    met: dict[str, list[Point]] = {}
+    for name in results.agents:
+        firsts = [one.first(goal) for one in results.courses if one.learner == name]
+        if all(firsts):
+            met[name] = [one for one in firsts if one]
+    return met
+
+
+def _verdict(results: Results, goal: float) -> str:
+    """Who is faster, in words."""
+    met = _firsts(results, goal)
+    text = [f"`{name}` does not reach the goal with every seed." for name in results.agents if name not in met]
+    first, *others = met or ("",)
+    for name in others:
+        periods = _ratio(met[name], met[first], "steps", ("fewer", "more"))
+        seconds = _ratio(met[name], met[first], "seconds", ("less", "more"))
+        text.append(f"`{name}` needs {periods} control periods than `{first}` and {seconds} time of the processor.")
+    text.append("These are ratios of medians over the seeds, which the table has in bold, with least and greatest.")
+    return " ".join(text)
+
+
+def _ratio(ours: Sequence[Point], theirs: Sequence[Point], what: str, words: tuple[str, str]) -> str:
+    share = middle(getattr(one, what) for one in ours) / middle(getattr(one, what) for one in theirs)
+    return f"{shown(1.0 / share)} times {words[0]}" if share < 1.0 else f"{shown(share)} times {words[1]}"
+
+
+def _compilation(name: str, costs: WindowCosts, results: Results, goal: float) -> str:
+    """What compiling adds for whoever trains for the first time."""
+    text = f"""Compiling is the price of `{name}`: on a machine that has never done so, Torch takes
+        {costs.compiling:.0f} s of the processor until the first window is over. Later runs find the code on disk and
+        take {costs.fetching:.1f} s for the same, which the times above include."""
+    firsts = _firsts(results, goal).get(name)
+    if firsts:
+        whole = middle(one.seconds for one in firsts) + costs.compiling - costs.fetching
+        text += f" The very first run thus takes {whole:.0f} s to the goal."
+    return paragraph(text)
+
+
+def _limits(results: Results) -> str:
+    """Where the time of each learner goes."""
+    share = SHARE.values(results.share)
+    rows = [(name, f"{shown(middle(values))} {RATE}", spread(values)) for name, values in results.share.items()]
+    rows.append((SHARE.name, f"{shown(middle(share))} %", spread(share)))
+    reached = "reached" if SHARE.goal and SHARE.goal.reached(middle(share)) else "**missed**"
+    parts = [
+        paragraph(
+            f"""PPO is limited by its own update. On robots that cost nothing, which answer with arrays of the same
+            shapes drawn beforehand, it would hardly be faster; the goal, {SHARE.goal} % of that speed, is
+            {reached}."""
+        ),
+        table(("training with PPO", "median", "middle half"), rows),
+    ]
+    for name, costs in results.costs.items():
+        whole = costs.forward + costs.backward + costs.critic
+        pieces = {
+            "forward: policy, motion, rewards": costs.forward,
+            "backward: the gradient through all of these": costs.backward,
+            "critic": costs.critic,
+            "whole": whole,
+        }
+        parts += [
+            paragraph(
+                f"""`{name}` is limited by how many kernels it launches: batches this small hardly keep one busy. A
+                window of {costs.periods:,} control periods takes, in milliseconds of the processor:"""
+            ),
+            table(
+                (name, "ms", "share"),
+                [(what, f"{1e3 * one:.1f}", f"{100.0 * one / whole:.0f} %") for what, one in pieces.items()],
+            ),
+            paragraph(
+                f"""That is {1e6 * whole / costs.periods:.0f} µs a control period, of which it makes {costs.substeps}
+                RK4 steps, as few as the robot's casters allow; policies are validated on the task's own. What makes
+                up for a dear period is what its gradient tells: PPO only learns whether an action was better than
+                another, SHAC which way to change it. Before each window it starts some robots anew, so that starts,
+                which are hardest, are seen often; PPO starts them when their episodes end."""
+            ),
+        ]
+    for name, (settings, rate) in results.rates.items():
+        parts.append(
+            paragraph(
+                f"""On tensors and on the same core, `{name}` (rsl-rl-lib, with {settings.robots:,} robots whose step is
+                compiled) trains at {shown(rate)} {RATE}; it is meant for a GPU."""
+            )
+        )
+    return "\n\n".join(parts)
+
+
+def _origin(results: Results, occasion: Occasion, folder: str) -> str:
+    """Command, machine, versions, and what counts."""
+    often = {name: f"every {max(1, one.steps // one.validations):,}" for name, one in results.agents.items()}
+    told = " and ".join(f"{name} {every}" for name, every in often.items())
+    lines = [
+        f"- Command: `{occasion.command}`",
+        "- Times are seconds of the processor, so that other work on the machine hardly counts; one thread",
+        "- A run's time begins before its robots and networks are made and ends with the validation that first meets "
+        "the goal, validations left out",
+    ]
+    if results.agents:
+        lines.append(f"- Policies are validated often ({told} control periods): times are rounded up to the next one")
+    lines += [
+        f"- PPO's speed: {occasion.turns} turns of one round each, collecting and updating, on both kinds of robots in "
+        "an order drawn anew",
+        f"- All validations: [validations.csv]({folder}/validations.csv)",
+        f"- Machine: {processor()}, {os.cpu_count()} cores, of which one is used",
+        f"- Load of the machine: {occasion.loads[0]:.1f} at the start, {occasion.loads[1]:.1f} at the end",
+        f"- Versions: {', '.join(f'{name} {number}' for name, number in versions().items())}",
+    ]
+    return "\n".join(lines)
+
+
+def write_points(path: Path, courses: Sequence[Course]) -> None:
+    """All validations."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("learner", "seed", "steps", "processor_seconds", "position_rmse", "failures"))
+        for one in courses:
+            for steps, seconds, verdict in one.points:
+                error = f"{verdict.position_rmse:.6g}"
+                writer.writerow((one.learner, one.seed, steps, f"{seconds:.2f}", error, verdict.failures))
+
+
+def draw(path: Path, courses: Sequence[Course], goal: float) -> None:
+    """Validation errors over processor time and over control periods, a line for each run."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    figure = new_figure(1, 2, (5.6, 4.2), sharey=True)
+    colours = dict(zip(dict.fromkeys(one.learner for one in courses), LINES, strict=False))
+    labels = "processor time [s]", "control periods of all robots together [thousands]"
+    for axis, field, unit, label in zip(figure.axes, ("seconds", "steps"), (1.0, 1e-3), labels, strict=True):
+        for learner, colour in colours.items():
+            for i, one in enumerate(run for run in courses if run.learner == learner):
+                places = [unit * getattr(point, field) for point in one.points]
+                errors = [1e3 * point.verdict.position_rmse for point in one.points]
+                name = None if i else learner
+                axis.plot(places, errors, color=colour, linewidth=1.1, alpha=0.65, label=name)
+                if first := one.first(goal):
+                    place = unit * getattr(first, field), 1e3 * first.verdict.position_rmse
+                    axis.plot(*place, "o", color=colour, markersize=6, markeredgecolor="white", zorder=3)
+        axis.axhline(1e3 * goal, color="0.25", linestyle="--", linewidth=1.0)
+        axis.set(xscale="log", yscale="log", xlabel=label)
+        for one_axis in (axis.xaxis, axis.yaxis):
+            one_axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            one_axis.set_major_formatter(lambda value, _: f"{value:,g}")
+            one_axis.set_minor_formatter(NullFormatter())
+    left, right = figure.axes
+    left.set_ylabel("position RMSE on validation paths [mm]")
+    left.legend(loc="lower left", frameon=False)
+    place = (0.02, 1e3 * goal * 1.06)
+    right.text(
+        *place, f"goal: {1e3 * goal:g} mm", transform=right.get_yaxis_transform(), color="0.25", fontsize="small"
+    )
+    figure.savefig(path, dpi=130)
