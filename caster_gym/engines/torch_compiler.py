@@ -9,7 +9,7 @@ from torch.utils import _pytree as pytree
 
 FUSED = 1_000_000  # intermediate values in one kernel of the CPU: past 64, the usual limit, they would go to memory
 READS = 1  # arrays behind a value that is worked out anew for each use: the usual 4 take the compiler twice as long
-_KEPT = {"inplace_buffers": False, "allow_buffer_reuse": False}  # else gradients of nested regions come out wrong
+_KEPT = {"inplace_buffers": False, "allow_buffer_reuse": False}  # else gradients come out wrong (Torch 2.13)
 _said: list[str] = []  # by this process
 
 

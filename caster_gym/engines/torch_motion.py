@@ -6,6 +6,7 @@ Rows of a state, each with an entry a robot: x, y, cos β, sin β in W, twist in
 import torch
 from torch import Tensor
 
+import caster_gym.engines.torch_scalars  # noqa: F401 - makes tensors scalars of the mechanics
 from caster_gym.mechanics.integration import State, derivative, pack_state, unit, unpack_state
 from caster_gym.mechanics.motors import joint_torques, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
