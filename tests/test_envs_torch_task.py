@@ -50,9 +50,10 @@ def test_a_wrench_pushes_the_robot():
 
 
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
-def test_each_part_is_one_graph_for_the_compiler(part):
+@pytest.mark.parametrize("name", ["track", "follow"])
+def test_each_part_is_one_graph_for_the_compiler(name, part):
     """So that nothing in it waits for the device; a break of the graph is an error of the compiler."""
-    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
+    task = TorchTask(name, path=CIRCLE, dtype=torch.float64)
     state, _ = task.begin(torch.arange(3))
     actions = torch.full((3, 6), 0.3)
     expected = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))

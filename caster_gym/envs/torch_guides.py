@@ -53,7 +53,7 @@ class TorchCourses:
         self.samples = torch.as_tensor(guide.samples, dtype=dtype, device=device).T.contiguous()  # (10, rows)
         self.spans = torch.as_tensor(guide.spans, device=device)
         self.weights = FollowWeights(*_weights(guide.weights, dtype, device))
-        self._guide = guide
+        self._guide, self._horizons = guide, tuple(guide.horizons.tolist())
         self._spacings = torch.as_tensor(guide.spacings, dtype=dtype, device=device)
         self._lengths = self._spacings * (self.spans[:, 1] - self.spans[:, 0])
         self._windows = torch.as_tensor((guide.window / guide.spacings).astype(int) + 2, device=device)
@@ -66,7 +66,7 @@ class TorchCourses:
         progress = torch.where(before < 0.0, 0.0, sought)
         reference = self._reference_at(path, progress, state)
         preview = []
-        for ahead in guide.horizons.tolist():
+        for ahead in self._horizons:
             r = self._reference_at(path, torch.minimum(progress + ahead, length), state)
             preview.append((r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega))
         share = minimum((progress - maximum(before, 0.0)) / guide.stride, 1.0)
