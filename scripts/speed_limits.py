@@ -128,10 +128,13 @@ def _batches(measured: Values, kind: str) -> str:
 
 
 def _torch(measured: Values) -> str:
-    bare, whole = _over(measured, "torch", "bare"), _over(measured, "torch_env", "env_cores")
+    bare, alone = _over(measured, "torch", "bare"), _over(measured, "torch_env_core", "env")
+    whole, scaling = _over(measured, "torch_env", "env_cores"), _over(measured, "torch_env", "torch_env_core")
     text = f"""**Torch: memory.** Each step is one fused kernel that reads and writes every state, where Numba keeps a
         block in the cache over many steps; in return it works in float32, has gradients and runs on GPUs. On a core it
-        makes {bare:.2f} times the bare steps of Numba, on two cores {whole:.2f} times the control periods."""
+        makes {bare:.2f} times the bare steps of Numba and {alone:.2f} times the control periods, on two cores
+        {whole:.2f} times: a second core makes it {scaling:.2f} times as fast, since its threads meet after each kernel,
+        and beside another busy process one thread is the better choice."""
     if measured.get("cuda"):
         bare, whole = _over(measured, "cuda", "bare_cores"), _over(measured, "cuda_env", "env_cores")
         text += f""" The GPU makes {bare:.1f} times the bare steps of both cores, and {whole:.1f} times the control

@@ -64,6 +64,7 @@ RATIOS = (
     Ratio("following among 6 obstacles over none", "follow_among", "follow"),
     Ratio("environment over its engine alone, two cores", "env_cores", "engine_cores"),
     Ratio("Torch over Numba, bare, 1 core", "torch", "bare"),
+    Ratio("Torch over Numba, environment, 1 core", "torch_env_core", "env"),
     Ratio("Torch over Numba, environment, two cores", "torch_env", "env_cores"),
     Ratio("GPU over Numba on two cores, bare", "cuda", "bare_cores"),
     Ratio("GPU over Numba on two cores, environment", "cuda_env", "env_cores"),

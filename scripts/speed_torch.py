@@ -10,7 +10,7 @@ from caster_gym import Robot
 from caster_gym.engines.torch_fleet import TorchFleet
 from caster_gym.envs.torch_vector_env import TorchVectorEnv
 from scripts.speed_robots import ACTION, BANK, CIRCLES, RK4_STEP, SCATTERING, SPEED, WIDE, limits
-from scripts.speed_timing import RATE, Row, Work, rate
+from scripts.speed_timing import RATE, Goal, Row, Work, at_least, rate
 
 EXCERPT = 400  # RK4 steps of a motion
 STEPS_A_CALL = 20  # of an environment, so that a GPU is waited for seldom
@@ -79,16 +79,20 @@ def on(threads: int, work: Work, seconds: float) -> Callable[[], float]:
 def torch_rows(robot: Robot, name: str, cores: int, seconds: float) -> list[Row]:
     """Rows of the processor, and of a GPU where there is one."""
 
-    def row(key: str, title: str, threads: int, work: Any) -> Row:
-        return Row(key, title, RATE, on(threads, work, seconds))
+    def row(key: str, title: str, threads: int, work: Any, goal: Goal | None = None) -> Row:
+        return Row(key, title, RATE, on(threads, work, seconds), goal)
 
+    environment = environment_tensors(name, 4096, "cpu")
+    bare = bare_tensors(robot, 4096, "cpu")
     rows = [
-        row("torch", "Torch, bare, float32, batch of 4,096, 1 core", 1, bare_tensors(robot, 4096, "cpu")),
+        row("torch", "Torch, bare, float32, batch of 4,096, 1 core", 1, bare, at_least(1e7)),
+        row("torch_env_core", "Torch, environment, float32, batch of 4,096, 1 core", 1, environment),
         row(
             "torch_env",
             f"Torch, environment, float32, batch of 4,096, {cores} cores",
             cores,
-            environment_tensors(name, 4096, "cpu"),
+            environment,
+            at_least(2e6),
         ),
     ]
     if torch.cuda.is_available():

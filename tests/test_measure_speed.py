@@ -15,6 +15,7 @@ from scripts.speed_robots import COARSE_STEP, RK4_STEP, bare_rows, environment_r
 from scripts.speed_timing import Ratio, Row, Work, at_least, at_most, rate, run, shown, spread
 
 ROBOT = load_robot("chung2008")
+TENSORS = {"torch", "torch_env", "torch_env_core", "cuda", "cuda_env"}  # keys of rows that are not measured here
 SESSION = Occasion("python -m scripts.measure_speed", 1, 1e-9, 1, (0.0, 0.0), True)
 
 
@@ -193,5 +194,5 @@ def test_everything_is_measured_and_shown(sections, accuracy):
 
 def test_rows_that_ratios_compare_exist(sections):
     """A key with a spelling mistake would make its ratio vanish from the page. Torch and a GPU may be missing here."""
-    keys = {row.key for _, _, those in sections for row in those} | {"torch", "torch_env", "cuda", "cuda_env"}
+    keys = {row.key for _, _, those in sections for row in those} | TENSORS
     assert all({ratio.over, ratio.under} <= keys for ratio in RATIOS)
