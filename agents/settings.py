@@ -169,16 +169,19 @@ class SHACSettings(Learner, OnTensors):
     """Short-horizon actor-critic (Xu et al., 2022): the policy's gradient passes through the simulator itself."""
 
     algorithm: Literal["shac"]
-    steps: PositiveInt = 2_000_000  # control periods of all robots together
-    learning_rate: PositiveFloat = 6e-3
-    critic_learning_rate: PositiveFloat = 2e-3
-    robots: PositiveInt = 256
+    compile: bool = True  # fuse the robots' step into few kernels, for which Torch needs a C++ compiler
+    substeps: PositiveInt | None = None  # RK4 steps of a period while learning; None: as few as the casters allow
+    steps: PositiveInt = 800_000  # control periods of all robots together
+    learning_rate: PositiveFloat = 1.2e-2
+    critic_learning_rate: PositiveFloat = 5e-3
+    robots: PositiveInt = 64
     window: PositiveInt = 16  # control periods through which a gradient passes
-    critic_batch: PositiveInt = 1024
+    restarts: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2  # share of the robots that start anew before a window
+    critic_batch: PositiveInt = 256
     critic_epochs: PositiveInt = 4
     trace: Fraction = 0.95  # λ of the critic's targets
     soft_update: Fraction = 0.8  # share of the critic that its target takes over after every window
-    greatest_gradient: PositiveFloat = 1.0  # a longer gradient is shortened to that norm
+    greatest_gradient: PositiveFloat = 1.0  # a longer gradient of the policy is shortened to that norm
     noise: NonNegativeFloat = 0.0  # standard deviation of what exploration adds to actions
 
     @model_validator(mode="after")

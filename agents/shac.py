@@ -3,6 +3,8 @@
 The robots run for a short window under the policy. What they earn in it, plus what a critic expects of the states at
 its end, is a smooth function of the policy's weights, and `TorchTask` passes its gradient back through every period.
 The critic learns from the same window, from targets of TD(λ), and a slowly following copy of it looks beyond the end.
+Before each window some robots, drawn at random, start anew: otherwise all would be in the same part of an episode at
+the same time, and what is hardest, the first second from a start with the casters turned anyhow, would be rare.
 """
 
 import copy
@@ -12,12 +14,15 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from caster_gym.envs.torch_task import TaskOutcome, TaskState, TorchTask
+from caster_gym import load_robot
+from caster_gym.envs.torch_task import TaskOutcome, TorchTask
 
 from .actor import Actor
-from .settings import SHACSettings
-from .tensors import torch_fields
+from .settings import SHACSettings, TaskSettings
+from .tensors import check_compiler, torch_fields
 from .training import Run
+
+MOMENTA = (0.7, 0.95)  # of the policy's Adam, as the paper has them: gradients through a simulator scatter little
 
 
 class Window(NamedTuple):
@@ -29,6 +34,31 @@ class Window(NamedTuple):
     ended: Tensor  # bool (window, robots)
 
 
+class Critic(nn.Module):
+    """Discounted rewards expected from what robots observe on, learned as their mean: a number near 1."""
+
+    def __init__(self, inputs: int, hidden: tuple[int, ...], discount: float) -> None:
+        super().__init__()
+        layers: list[nn.Module] = []
+        for before, after in pairwise((inputs, *hidden)):
+            layers += [nn.Linear(before, after), nn.ReLU()]
+        head = nn.Linear(hidden[-1], 1)
+        with torch.no_grad():
+            head.weight *= 0.1
+            head.bias.fill_(0.5)
+        self.mean, self.periods = nn.Sequential(*layers, head), 1.0 / (1.0 - discount)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Expected returns (…) for observations (…, size)."""
+        returns: Tensor = self.periods * self.mean(observations)[..., 0]
+        return returns
+
+    def loss(self, observations: Tensor, returns: Tensor) -> Tensor:
+        """Mean square error of the mean rewards."""
+        loss: Tensor = ((self(observations) - returns) / self.periods).square().mean()
+        return loss
+
+
 class ShortHorizon:
     """A policy, its critic, and the robots on which both learn."""
 
@@ -37,27 +67,28 @@ class ShortHorizon:
         size, actions = task.layout.size, len(task.robot.driven)
         self.task, self.settings = task, settings
         self.actor = Actor(size, settings.hidden, actions, "tanh").to(task.device, task.dtype)
-        _begin_gently(self.actor.head)
-        self.critic = _critic(size, settings.hidden).to(task.device, task.dtype)
+        self.critic = Critic(size, settings.hidden, settings.discount).to(task.device, task.dtype)
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
-        self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), settings.learning_rate)
-        self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), settings.critic_learning_rate)
+        self.actor_optimizer = torch.optim.Adam(
+            self.actor.parameters(), settings.learning_rate, betas=MOMENTA, fused=True
+        )
+        self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), settings.critic_learning_rate, fused=True)
         keys = torch.randint(2**63 - 1, (settings.robots,), dtype=torch.int64).to(task.device)
-        self.state, outcome = task.begin(keys)
-        self.observations = outcome.observations
+        self.state, self.outcome = task.begin(keys)
 
     def improve(self, progress: float) -> dict[str, float]:
         """One window and one step of both; progress of the training, 0 … 1. Returns what is worth recording."""
         left = 1.0 - progress if self.settings.falling else 1.0
         self._set_rate(self.actor_optimizer, left * self.settings.learning_rate)
         self._set_rate(self.critic_optimizer, left * self.settings.critic_learning_rate)
+        self.start_some_anew()
         gain, window = self.gain()
         self.actor_optimizer.zero_grad()
         torch.autograd.backward(-gain)
         norm = nn.utils.clip_grad_norm_(self.actor.parameters(), self.settings.greatest_gradient)
         if bool(torch.isfinite(norm)):  # a robot that blew up must not take the policy with it
             self.actor_optimizer.step()
-        loss = self._teach_critic(window)
+        loss = self.teach_critic(window)
         return {
             "reward": float(window.rewards.mean()),
             "gradient": float(norm),
@@ -65,54 +96,62 @@ class ShortHorizon:
             "learning_rate": left * self.settings.learning_rate,
         }
 
+    def start_some_anew(self) -> None:
+        """A new episode for each robot with the probability that the settings say."""
+        chosen = torch.rand(self.settings.robots, device=self.task.device) < self.settings.restarts
+        if bool(chosen.any()):
+            self.state, self.outcome = self.task.restart(self.state, self.outcome, where=chosen)
+
     def gain(self) -> tuple[Tensor, Window]:
         """Mean discounted return per period of a window under the present policy, and the window.
 
         The robots have moved on afterwards, and carry no gradient into the next window.
         """
-        discount = self.settings.discount
-        state, observations = self.state.detached(), self.observations.detach()
+        discount, last = self.settings.discount, self.settings.window - 1
+        state, outcome = self.state, self.outcome
         total = torch.zeros((), dtype=self.task.dtype, device=self.task.device)
         weight = torch.ones_like(state.progress)
-        seen, rewards, after, ended = [], [], [], []
+        seen, met = [], []
         for k in range(self.settings.window):
-            seen.append(observations.detach())
-            state, outcome = self.task.step(state, self._explore(observations))
-            value = torch.where(outcome.terminated, 0.0, self.target(outcome.observations)[:, 0])
-            over = outcome.ended if k < self.settings.window - 1 else torch.ones_like(outcome.ended)
-            total = total + (weight * outcome.rewards + torch.where(over, discount * weight * value, 0.0)).sum()
-            weight = torch.where(over, 1.0, discount * weight)
-            rewards.append(outcome.rewards.detach())
-            after.append(value.detach())
-            ended.append(outcome.ended)
-            state, observations = self._begin_again(state, outcome)
-        self.state, self.observations = state.detached(), observations.detach()
-        window = Window(torch.stack(seen), torch.stack(rewards), torch.stack(after), torch.stack(ended))
+            seen.append(outcome.observations.detach())
+            state, outcome = self.task.step(state, self._explore(outcome.observations))
+            ended = outcome.ended
+            met.append((outcome.observations.detach(), outcome.rewards.detach(), outcome.terminated, ended))
+            total = total + (weight * outcome.rewards).sum()
+            weight = discount * weight
+            any_ended = bool(ended.any())
+            if any_ended or k == last:
+                over = torch.ones_like(ended) if k == last else ended
+                value = self._expected(outcome.observations, outcome.terminated)
+                total = total + torch.where(over, weight * value, 0.0).sum()
+                weight = torch.where(over, 1.0, weight)
+            if any_ended:
+                state, outcome = self.task.restart(state, outcome)
+        self.state, self.outcome = state.detached(), _detached(outcome)
+        after, rewards, terminated, ends = (torch.stack(parts) for parts in zip(*met, strict=True))
+        window = Window(torch.stack(seen), rewards, self._expected(after, terminated), ends)
         return total / (self.settings.window * self.settings.robots), window
 
     def _explore(self, observations: Tensor) -> Tensor:
         actions: Tensor = self.actor(observations)
         return actions + self.settings.noise * torch.randn_like(actions) if self.settings.noise else actions
 
-    def _begin_again(self, state: TaskState, outcome: TaskOutcome) -> tuple[TaskState, Tensor]:
-        """New episodes where they have ended, if any has."""
-        if bool(outcome.ended.any()):
-            state, outcome = self.task.restart(state, outcome)
-        return state, outcome.observations
+    def _expected(self, observations: Tensor, terminated: Tensor) -> Tensor:
+        """What the target critic expects after a period, from its observations before anything starts anew."""
+        return torch.where(terminated, 0.0, self.target(observations))
 
-    def _teach_critic(self, window: Window) -> float:
+    def teach_critic(self, window: Window) -> float:
         """Several passes over the window in batches drawn at random; returns the mean loss of the last one."""
-        size = self.settings.critic_batch
         observations = window.observations.flatten(0, 1)
         targets = td_lambda(window, self.settings.discount, self.settings.trace).flatten()
         losses: list[Tensor] = []
         for _ in range(self.settings.critic_epochs):
+            order = torch.randperm(len(targets), device=targets.device)
             losses = []
-            for batch in torch.split(torch.randperm(len(targets), device=targets.device), size):
-                loss = (self.critic(observations[batch])[:, 0] - targets[batch]).square().mean()
+            for batch in torch.split(order, self.settings.critic_batch):
+                loss = self.critic.loss(observations[batch], targets[batch])
                 self.critic_optimizer.zero_grad()
                 torch.autograd.backward(loss)
-                nn.utils.clip_grad_norm_(self.critic.parameters(), self.settings.greatest_gradient)
                 self.critic_optimizer.step()
                 losses.append(loss.detach())
         with torch.no_grad():
@@ -137,16 +176,36 @@ def td_lambda(window: Window, discount: float, trace: float) -> Tensor:
     return targets
 
 
-def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
-    """Train on tensors."""
-    task = TorchTask(
-        run.task.environment,
-        fields=run.task.task.model_dump(),
+def make_task(task: TaskSettings, settings: SHACSettings) -> TorchTask:
+    """The task through which gradients pass. Raises ValueError if its step is to be compiled and cannot be."""
+    check_compiler(settings)
+    return TorchTask(
+        task.environment,
+        fields={**task.task.model_dump(), "substeps": settings.substeps or _fewest_substeps(task)},
         device=settings.device,
         compile=settings.compile,
-        **torch_fields(run.task),
+        diagnostics=False,
+        **torch_fields(task),
     )
-    learner = ShortHorizon(task, settings, run.seed)
+
+
+def _fewest_substeps(task: TaskSettings) -> int:
+    """RK4 steps of a control period: as few as the robot's casters allow, at most the task's own."""
+    robot = load_robot(task.robot)
+    for count in range(1, task.task.substeps):
+        try:
+            robot.check_time_step(task.task.control_period / count)
+        except ValueError:
+            continue
+        return count
+    return task.task.substeps
+
+
+def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
+    """Train on tensors; on a CPU in one thread, since batches this small gain nothing from others and wait for them."""
+    if torch.device(settings.device).type == "cpu":
+        torch.set_num_threads(1)
+    learner = ShortHorizon(make_task(run.task, settings), settings, run.seed)
     steps = 0
     try:
         while steps < settings.steps:
@@ -165,15 +224,6 @@ def frozen(actor: Actor) -> Actor:
     return copy.deepcopy(actor).to("cpu", torch.float32).requires_grad_(False)
 
 
-def _critic(size: int, hidden: tuple[int, ...]) -> nn.Sequential:
-    layers: list[nn.Module] = []
-    for inputs, outputs in pairwise((size, *hidden)):
-        layers += [nn.Linear(inputs, outputs), nn.ReLU()]
-    return nn.Sequential(*layers, nn.Linear(hidden[-1], 1))
-
-
-def _begin_gently(head: nn.Linear) -> None:
-    """A fresh policy hardly pushes, so that its first windows stay on the path."""
-    with torch.no_grad():
-        head.weight *= 0.01
-        head.bias.zero_()
+def _detached(outcome: TaskOutcome) -> TaskOutcome:
+    """The same outcome without its past."""
+    return TaskOutcome(*(tensor.detach() for tensor in outcome))

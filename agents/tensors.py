@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from .settings import TaskSettings
+import torch
+
+from .settings import OnTensors, TaskSettings
 
 
 def torch_fields(task: TaskSettings) -> dict[str, Any]:
@@ -17,3 +19,19 @@ def torch_fields(task: TaskSettings) -> dict[str, Any]:
                 f"or leave out {', '.join(repr(feature.kind) for feature in features)}"
             )
     return {"robot": task.robot, "path": task.train, "actuation": task.actuation, "arena": task.arena}
+
+
+def check_compiler(settings: OnTensors) -> None:
+    """Raises ValueError if the robots' step is to be compiled for the CPU and there is no C++ compiler."""
+    if not settings.compile or torch.device(settings.device).type != "cpu":
+        return
+    from torch._inductor.cpp_builder import get_cpp_compiler  # as Torch itself finds it; slow to import
+    from torch._inductor.exc import InvalidCxxCompiler
+
+    try:
+        get_cpp_compiler()
+    except InvalidCxxCompiler:
+        raise ValueError(
+            "compile=true needs a C++ compiler, and none was found: install g++ or name one in the environment "
+            "variable CXX, or set compile=false, which takes many times as long"
+        ) from None

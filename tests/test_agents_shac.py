@@ -8,10 +8,11 @@ import yaml
 from caster_gym import load_robot
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.settings import SHACSettings, TaskSettings, read_agent
-from caster_gym.agents.shac import ShortHorizon, Window, frozen, td_lambda
+from caster_gym.agents.shac import Critic, ShortHorizon, Window, frozen, make_task, td_lambda
 from caster_gym.agents.training import train
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.torch_task import TorchTask
+from caster_gym.envs.track_task import TrackTask
 
 QUICK = {"control_period": 0.01, "substeps": 1}  # one RK4 step a period: Torch alone, uncompiled, is slow
 PATH = {"shape": "random_paths", "duration": 2.5, "max_speed": 0.3, "count": 2}
@@ -23,7 +24,15 @@ TASK = parse(
     },
     "task",
 )
-FIELDS = {"algorithm": "shac", "robots": 4, "window": 3, "critic_batch": 6, "hidden": (16,), "noise": 0.0}
+FIELDS = {
+    "algorithm": "shac",
+    "robots": 4,
+    "window": 3,
+    "critic_batch": 6,
+    "hidden": (16,),
+    "restarts": 0.0,
+    "compile": False,  # which would take longer than all tests together
+}
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +52,7 @@ def learner(longest=None, dtype=torch.float64, seed=0, **changes):
 def gain_of(learning, weights, start):
     """The gain of a policy with these weights, from the same start."""
     torch.nn.utils.vector_to_parameters(weights, learning.actor.parameters())
-    learning.state, learning.observations = start
+    learning.state, learning.outcome = start
     return learning.gain()[0]
 
 
@@ -51,7 +60,7 @@ def gain_of(learning, weights, start):
 def test_gradient_is_the_derivative_of_the_return(longest):
     """Central differences along random directions of all weights, through dynamics, reward, policy and critic."""
     learning = learner(longest)
-    start = learning.state, learning.observations
+    start = learning.state, learning.outcome
     rng = torch.Generator().manual_seed(2)
     weights = torch.nn.utils.parameters_to_vector(learning.actor.parameters()).detach()
     weights = weights + 0.1 * torch.randn(len(weights), generator=rng, dtype=weights.dtype)
@@ -91,8 +100,31 @@ def test_nothing_is_expected_after_a_failure():
 def test_no_gradient_enters_a_window():
     learning = learner()
     learning.gain()
-    assert not learning.observations.requires_grad
-    assert not any(tensor.requires_grad for tensor in learning.state)
+    assert not any(tensor.requires_grad for tensor in (*learning.state, *learning.outcome))
+
+
+def test_some_robots_start_anew_before_a_window():
+    """Those that do are at rest in their next episode; for all others nothing has changed."""
+    learning = learner(robots=64, critic_batch=192, restarts=0.25)
+    learning.gain()
+    before, seen = learning.state, learning.outcome.observations
+    learning.start_some_anew()
+    anew = learning.state.clocks == 0
+    assert 0.05 * 64 < int(anew.sum()) < 0.5 * 64  # a quarter, give or take three standard deviations of 5 %
+    assert (learning.state.bodies[4:7, anew] == 0.0).all()
+    assert torch.equal(learning.state.episodes, before.episodes + anew)
+    assert torch.equal(learning.state.bodies[:, ~anew], before.bodies[:, ~anew])
+    assert torch.equal(learning.outcome.observations[~anew], seen[~anew])
+    assert (learning.outcome.observations[anew] != seen[anew]).any(dim=1).all()
+
+
+def test_a_critic_learns_a_return_as_its_mean_reward():
+    """Error of 2 in a return worth 10 periods: 0.2 in the mean reward."""
+    critic = Critic(3, (8,), discount=0.9)
+    observations = torch.ones(2, 5, 3)
+    returns = critic(observations)
+    assert returns.shape == (2, 5)
+    torch.testing.assert_close(critic.loss(observations, returns + 2.0), torch.tensor(0.04))
 
 
 def test_targets_lie_between_one_step_and_the_whole_window():
@@ -131,10 +163,12 @@ def test_policies_get_better():
     learning = ShortHorizon(task, parse(SHACSettings, {**FIELDS, **changes}, "agent"), seed=0)
     for parameter in (*learning.critic.parameters(), *learning.target.parameters()):
         parameter.data.zero_()
-    start = learning.state, learning.observations
+    with torch.no_grad():
+        learning.actor.head.weight *= 0.01  # begins with hardly any torque
+    start = learning.state, learning.outcome
     rewards = []
     for _ in range(5):
-        learning.state, learning.observations = start
+        learning.state, learning.outcome = start
         rewards.append(learning.improve(0.0)["reward"])
     assert rewards[-1] > rewards[0] + 0.004
 
@@ -177,6 +211,7 @@ def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
         ({"critic_batch": 13}, r"a critic_batch of 13 needs at most robots · window = 12 steps"),
         ({"window": 0}, "'window' should be greater than 0, got 0"),
         ({"noise": -0.1}, "'noise' should be .*-0.1"),
+        ({"restarts": 1.5}, "'restarts' should be .*1.5"),
         ({"horizon": 16}, "unknown key 'horizon'"),
     ],
 )
@@ -187,3 +222,20 @@ def test_what_is_wrong_with_the_settings_is_named(content, message):
 
 def test_settings_that_come_with_the_package():
     assert isinstance(read_agent("shac"), SHACSettings)
+
+
+def test_a_missing_compiler_is_named_with_the_setting(monkeypatch):
+    monkeypatch.setattr(torch._inductor.config.cpp, "cxx", ("no-such-compiler",))
+    with pytest.raises(ValueError, match=r"compile=true needs a C\+\+ compiler, and none was found.*compile=false"):
+        make_task(TASK, parse(SHACSettings, {**FIELDS, "compile": True}, "agent"))
+    assert not make_task(TASK, parse(SHACSettings, FIELDS, "agent")).diagnostics
+
+
+@pytest.mark.parametrize(("robot", "period", "own", "taken"), [("chung2008", 0.02, 4, 2), ("chung2008", 0.01, 1, 1)])
+def test_robots_learn_with_as_few_time_steps_as_their_casters_allow(robot, period, own, taken):
+    """A trail of 25 mm at 2.5 m/s asks for steps of 10 ms or less."""
+    fields = {"control_period": period, "substeps": own, "preview": (0.1,)}
+    task = TASK.model_copy(update={"robot": robot, "task": TrackTask(**fields)})
+    settings = parse(SHACSettings, FIELDS, "agent")
+    assert make_task(task, settings).task.substeps == taken
+    assert make_task(task, settings.model_copy(update={"substeps": own})).task.substeps == own

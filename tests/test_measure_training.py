@@ -1,4 +1,6 @@
-"""scripts/measure_training.py: free robots look like ours to PPO, and its tables say what was measured."""
+"""scripts/measure_training.py and its page: free robots look like ours to PPO, and the page says what was measured."""
+
+import csv
 
 import numpy as np
 import pytest
@@ -9,19 +11,20 @@ from caster_gym.agents.evaluation import training_batch
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.agents.track_metrics import TrackVerdict
-from caster_gym.agents.training import Validation
 from caster_gym.configuration import parse
+from scripts import measure_training
 from scripts.measure_training import (
     FREE,
     OURS,
     FreeVecEnv,
-    Success,
     main,
+    rate_on_tensors,
     read_learner,
-    share_lines,
     share_rows,
-    success_lines,
+    train_timed,
+    window_costs,
 )
+from scripts.training_page import Course, Occasion, Point, Results, WindowCosts, page
 
 PATH = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3, "count": 2}
 CONTENT = {kind: [{**PATH, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
@@ -58,33 +61,122 @@ def test_episodes_of_free_robots_end_by_time():
                 np.testing.assert_array_equal(info["terminal_observation"], observations[robot])
 
 
-def test_tables_tell_medians_and_shares():
+def test_speeds_are_measured():
+    """A smoke test."""
     settings = read_learner("ppo", {}).model_copy(update={"robots": 2, "horizon": 8, "batch": 8, "hidden": (4,)})
     rows = share_rows(TASK, settings)
     assert [row.key for row in rows] == [OURS, FREE]
     assert all(row.measure() > 0.0 for row in rows)
-    lines = share_lines(rows, {OURS: [90.0, 96.0, 99.0], FREE: [100.0, 100.0, 100.0]})
-    assert lines[2].startswith(f"| {OURS} | 96 steps/s |")
-    assert "goal ≥ 95: reached" in lines[4]
-    assert "| 96 % | 93 – 97.5 |" in lines[4]
 
 
-def test_tables_tell_who_reached_the_goal_and_who_did_not():
-    verdict = TrackVerdict(position_rmse=0.004, worst_position=0.01, heading_rmse=0.01, failures=0, reward=0.9)
-    first = Validation(1000, 12.0, verdict)
-    reached, missed = success_lines([Success("ppo", 0, first, first), Success("shac", 1, None, first)], 5e-3)[2:]
-    assert reached.startswith("| ppo | 0 | 12 s | 1,000 | position RMSE 4 mm")
-    assert missed.startswith("| shac | 1 | not reached |")
+def point(steps, seconds, error, failures=0):
+    return Point(steps, seconds, TrackVerdict(error, 2.0 * error, 0.01, failures, 0.9))
+
+
+def test_a_goal_is_met_without_failures_alone():
+    early, failed, met, later = (
+        point(1, 1.0, 0.02),
+        point(2, 2.0, 0.001, failures=1),
+        point(3, 3.0, 0.004),
+        point(4, 4.0, 0.003),
+    )
+    course = Course("ppo", 0, (early, failed, met, later))
+    assert course.first(5e-3) is met
+    assert course.first(1e-3) is None
+    assert course.best is later
+
+
+def results(*courses):
+    agents = {name: read_learner(name, {"validations": 50}) for name in dict.fromkeys(one.learner for one in courses)}
+    share = {OURS: [90.0, 96.0, 99.0], FREE: [100.0, 100.0, 100.0]}
+    costs = {"shac": WindowCosts(1024, 2, 0.02, 0.01, 0.01, compiling=50.0, fetching=4.0)} if "shac" in agents else {}
+    rates = {"ppo_gpu": (read_learner("ppo_gpu", {}), 12345.0)}
+    return Results(agents, share, courses, costs, rates)
+
+
+def told(*courses):
+    """The page with its lines joined."""
+    return " ".join(page(results(*courses), Occasion("a command", 15, 5e-3, (0.5, 1.0)), "training").split())
+
+
+PPO = [Course("ppo", seed, (point(100_000, 10.0 + seed, 0.02), point(400_000, 30.0, 0.004))) for seed in (0, 1, 2)]
+SHAC = [Course("shac", seed, (point(20_000, 6.0, 0.02), point(100_000, 10.0 + seed, 0.002))) for seed in (0, 1, 2)]
+
+
+def test_a_page_tells_who_is_faster_and_by_how_much():
+    text = told(*PPO, *SHAC)
+    assert "`shac` needs 4 times fewer control periods than `ppo` and 2.73 times less time of the processor" in text
+    assert "| shac | 1 | 100,000 | 11.0 s | 2.00 mm, after 11 s of 11 s |" in text
+    assert "| **shac** | 3 of 3 seeds | **100,000** (100,000 – 100,000) | **11.0** (10.0 – 12.0) s | **2.00** (" in text
+    assert "takes 50 s of the processor until the first window is over" in text
+    assert "The very first run thus takes 57 s to the goal." in text  # 11 + 50 − 4
+    assert "| backward: the gradient through all of these | 10.0 | 25 % |" in text
+    assert "39 µs a control period" in text  # 40 ms over 1,024
+    assert "trains at 12,300 steps/s" in text
+
+
+def test_a_page_tells_what_was_lost():
+    slow = [Course("shac", seed, (point(800_000, 60.0 + seed, 0.0049),)) for seed in (0, 1, 2)]
+    text = told(*PPO, *slow)
+    assert "`shac` needs 2 times more control periods than `ppo` and 2.03 times more time of the processor" in text
+    never = Course("shac", 0, (point(800_000, 60.0, 0.001, failures=2),))
+    text = told(*PPO, never)
+    assert "`shac` does not reach the goal with every seed." in text
+    assert "| shac | 0 | not reached | | 1.00 mm, 2 failures" in text
+    assert "times fewer" not in text
+
+
+def test_a_page_tells_the_share_of_a_zero_cost_environment():
+    text = told(*PPO)
+    assert "the goal, ≥ 95 % of that speed, is reached" in text
+    assert f"| {OURS} | 96 steps/s |" in text
+    assert "| 96 % | 93 – 97.5 |" in text
+
+
+def test_time_of_validations_is_left_out(monkeypatch):
+    """With a clock that moves on in validations alone, training takes no time."""
+    clock = [0.0]
+    monkeypatch.setattr(measure_training, "processor_seconds", lambda: clock[0])
+    original = measure_training.Run.validate
+
+    def slow_validation(self, actor):
+        clock[0] += 100.0
+        original(self, actor)
+
+    monkeypatch.setattr(measure_training.Run, "validate", slow_validation)
+    settings = read_learner(
+        "ppo", {"robots": 2, "horizon": 8, "batch": 8, "hidden": [4], "steps": 48, "validations": 3}
+    )
+    course = train_timed("ppo", TASK, settings, 1)
+    assert [(one.steps, one.seconds) for one in course.points] == [(16, 0.0), (32, 0.0), (48, 0.0)]
+    assert clock[0] == 300.0
+
+
+def test_learners_on_tensors_are_measured(monkeypatch):
+    """A smoke test, uncompiled."""
+    monkeypatch.setattr(measure_training, "WINDOWS", 1)
+    fields = {"compile": False, "robots": 2, "hidden": [4]}
+    costs = window_costs(TASK, read_learner("shac", {**fields, "window": 2, "critic_batch": 4}))
+    assert (costs.periods, costs.substeps) == (4, 2)
+    assert min(costs[2:]) > 0.0
+    ppo = read_learner("ppo_gpu", {**fields, "horizon": 2, "batch": 4})
+    assert rate_on_tensors(TASK, ppo) > 0.0
+    with pytest.raises(ValueError, match=r"only PPO on tensors .* got algorithm 'ppo'"):
+        rate_on_tensors(TASK, read_learner("ppo", {}))
 
 
 def test_a_run_makes_a_page(tmp_path):
     """A smoke test with a goal that everybody meets."""
     (tmp_path / "task.yaml").write_text(yaml.safe_dump(CONTENT), encoding="utf-8")
-    arguments = ["--task", str(tmp_path / "task.yaml"), "--agents", "ppo", "--seeds", "0", "--steps", "16384"]
-    main([*arguments, "--turns", "1", "--goal", "10", "--out", str(tmp_path / "page.md")])
+    arguments = ["--task", str(tmp_path / "task.yaml"), "--agents", "ppo", "--tensors", "--seeds", "0"]
+    main([*arguments, "--steps", "16384", "--turns", "1", "--goal", "10", "--out", str(tmp_path / "page.md")])
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert "| ppo | 0 |" in text
-    assert "PPO on robots that cost nothing" in text
+    assert "| ppo | 0 | 16,384 |" in text
+    assert "(page/learning.png)" in text
+    assert (tmp_path / "page" / "learning.png").stat().st_size > 10_000  # a picture with something in it
+    with (tmp_path / "page" / "validations.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["learner"], row["steps"]) for row in rows] == [("ppo", "16384")]
 
 
 def test_mistakes_are_named():
