@@ -27,7 +27,7 @@ def compiled(function: Callable[..., Any], device: torch.device, graphs: bool = 
     else:
         options["triton.cudagraphs"] = graphs
     announce_compilation()
-    return torch.compile(function, fullgraph=True, dynamic=False, options=options)
+    return torch.compile(function, fullgraph=True, dynamic=False, options=options, isolate_recompiles=True)
 
 
 def announce_compilation() -> None:
