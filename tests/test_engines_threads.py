@@ -4,6 +4,7 @@ import multiprocessing
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -75,6 +76,28 @@ def test_an_error_in_any_thread_is_raised(threads, broken):
 
     with pytest.raises(RuntimeError, match="block broke"):
         over_blocks(fail, 100)
+
+
+def test_nothing_goes_on_after_an_interrupt():
+    """Shares that nobody has begun stay undone, and those begun elsewhere are over when the caller hears of it."""
+    before = get_threads()
+    set_threads(2)
+    begun, over, caller = [], [], threading.current_thread()
+
+    def step(first, end):
+        if threading.current_thread() is caller:
+            raise KeyboardInterrupt
+        begun.append(first)
+        time.sleep(0.05)
+        over.append(first)
+
+    with pytest.raises(KeyboardInterrupt):
+        over_blocks(step, 100)
+    assert len(begun) <= 1
+    assert over == begun
+    time.sleep(0.1)
+    assert over == begun
+    set_threads(before)
 
 
 def _work_after_fork(reply):

@@ -55,3 +55,30 @@ def test_products_with_other_numbers_stay():
     result, left = folded(lambda x, y: 2.0 * x - y / 3.0, X, Y)
     assert_array_equal(result, 2.0 * X - Y / 3.0)
     assert sorted(left) == ["mul", "sub", "truediv"]
+
+
+def filled(x):
+    y = 0.0 * x
+    y[0] = 5.0
+    return y + x
+
+
+def grown(x):
+    y = 1.0 * x
+    y += 1.0
+    return y.add_(x)
+
+
+def test_graphs_that_write_into_tensors_are_left_alone():
+    for function in (filled, grown):
+        mine = X.clone()
+        result, _ = folded(function, mine)
+        assert_array_equal(result, function(X.clone()))
+        assert_array_equal(mine, X)
+
+
+def test_whole_numbers_stay_whole():
+    whole = torch.arange(4)
+    result, _ = folded(lambda i: (0 * i) - i, whole)
+    assert result.dtype == torch.int64
+    assert_array_equal(result, -whole)

@@ -5,6 +5,7 @@ import math
 import pytest
 import torch
 
+from caster_gym.envs import block_layout as layout
 from caster_gym.envs.torch_task import TorchTask
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
@@ -47,6 +48,24 @@ def test_a_wrench_pushes_the_robot():
     moved, _ = task.step(state, torch.zeros((1, 6)), torch.tensor([[1.0, 0.0, 0.0]]))
     speed = math.hypot(moved.bodies[4].item(), moved.bodies[5].item())
     assert 0.02 / 9.0 < speed < 0.02 / 5.0
+
+
+def test_a_wrench_of_another_shape_is_refused():
+    task = TorchTask("track", path=CIRCLE)
+    state, _ = task.begin(torch.arange(2))
+    with pytest.raises(ValueError, match=r"wrench must have shape \(2, 3\), got \(3,\)"):
+        task.step(state, torch.zeros((2, 6)), torch.ones(3))
+
+
+def test_what_is_seen_at_a_start_depends_on_the_robots_own_numbers():
+    """Its casters' trails scale their observed rates, and more."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
+    trail = torch.full((2,), 0.02, dtype=torch.float64, requires_grad=True)
+    casters = tuple(caster._replace(trail=trail) for caster in task.parameters.casters)
+    task.parameters = task.parameters._replace(casters=casters)
+    _, outcome = task.begin(torch.arange(2))
+    (slope,) = torch.autograd.grad(outcome.report[layout.CONDITIONING].sum(), trail)
+    assert (slope != 0.0).all()
 
 
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_OURS = 3  # references to an array that nobody else holds: the shelf's, the loop's, the count's own argument
+KEPT = 4  # arrays of a shelf; whoever holds more gets ones that go back to the operating system
 
 
 class Shelf:
     """Arrays of one shape and type, uninitialised, each lent to whoever takes it until no reference to it is left.
 
-    A view, a Torch tensor or anything else on the array's memory counts as a reference.
+    Views, Torch tensors and buffers refer to their array; a bare address does not.
     """
 
     def __init__(self, shape: tuple[int, ...], dtype: type[np.generic]) -> None:
@@ -25,8 +25,18 @@ class Shelf:
 
     def take(self) -> NDArray[Any]:
         """An array that nobody else holds; a new one if there is none."""
-        for array in self._arrays:
-            if sys.getrefcount(array) == _OURS:
-                return array
-        self._arrays.append(np.empty(self._shape, self._dtype))
-        return self._arrays[-1]
+        holders = _holders(self._arrays)
+        if _NOBODY in holders:
+            return self._arrays[holders.index(_NOBODY)]
+        array = np.empty(self._shape, self._dtype)
+        if len(self._arrays) < KEPT:
+            self._arrays.append(array)
+        return array
+
+
+def _holders(arrays: list[NDArray[Any]]) -> list[int]:
+    """How many references there are to each array, those of the list and of this function included."""
+    return [sys.getrefcount(array) for array in arrays]
+
+
+_NOBODY = _holders([np.empty(0)])[0]  # versions of Python count differently

@@ -6,8 +6,9 @@ pool is left alone: waking it would change the number of threads that Torch uses
 """
 
 import os
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 from typing import Any
 
@@ -35,7 +36,11 @@ def set_threads(count: int) -> None:
 
 
 def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> None:
-    """function(first, end, *arguments) for ranges that cover all blocks; threads take one after the other."""
+    """function(first, end, *arguments) for ranges that cover all blocks; threads take one after the other.
+
+    After an error, or an interrupt, those that nobody has begun are left out, and nothing goes on behind the caller's
+    back.
+    """
     shares = min(_count * SHARES_PER_THREAD, blocks // BLOCKS_PER_SHARE)
     if _count < 2 or shares < 2:
         function(0, blocks, *arguments)
@@ -48,9 +53,13 @@ def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> N
             function(first, end, *arguments)
 
     others = [_threads().submit(work) for _ in range(min(_count, shares) - 1)]
-    work()
+    try:
+        work()
+    finally:
+        deque(untaken, maxlen=0)
+        wait([other for other in others if not other.cancel()])
     for other in others:
-        if not other.cancel():
+        if not other.cancelled():
             other.result()
 
 

@@ -27,7 +27,11 @@ def compiled(function: Callable[..., Any], device: torch.device, graphs: bool = 
     else:
         options["triton.cudagraphs"] = graphs
     announce_compilation()
-    return torch.compile(function, fullgraph=True, dynamic=False, options=options, isolate_recompiles=True)
+    compile_: Any = torch.compile  # whose declared types lack the last argument
+    made: Callable[..., Any] = compile_(
+        function, fullgraph=True, dynamic=False, options=options, isolate_recompiles=True
+    )
+    return made
 
 
 def announce_compilation() -> None:

@@ -1,7 +1,8 @@
 """Sums and products with the zeros of a robot's parameters, taken out of what Torch compiles.
 
 A robot without friction, offsets and armatures multiplies nearly half of its terms by zero. Torch's compiler keeps
-them, since 0 · x is not zero where x is no number; in the mechanics such an x shows in the inertial terms anyway.
+them, since 0 · x and 0 / x are not zero where x is no number, or 0; in the mechanics such an x shows in the inertial
+terms anyway. Graphs that write into tensors are left as they are.
 """
 
 import operator
@@ -22,6 +23,9 @@ class Folding(CustomGraphPass):
         return get_hash_for_files((__file__,))
 
     def __call__(self, graph: Graph) -> None:
+        """Fold the graph."""
+        if any(_writes(node) for node in graph.nodes):
+            return
         worth: dict[Node, Worth] = {}
 
         def same(node: Node) -> Node:
@@ -29,7 +33,7 @@ class Folding(CustomGraphPass):
             return found if isinstance(found, Node) else node  # a number is a tensor to whoever reads it
 
         for node in graph.nodes:
-            if node.op == "call_function" and node.target in _RULES:
+            if node.op == "call_function" and node.target in _RULES and _kind(node)[1].is_floating_point:
                 operands = tuple(worth.get(one, one) if isinstance(one, Node) else one for one in node.args)
                 folded = _RULES[node.target](*operands)
                 if folded is not None and (not isinstance(folded, Node) or _kind(folded) == _kind(node)):
@@ -40,6 +44,13 @@ class Folding(CustomGraphPass):
                     continue
             node.args, node.kwargs = map_arg(node.args, same), map_arg(node.kwargs, same)
         graph.eliminate_dead_code()
+
+
+def _writes(node: Node) -> bool:
+    """Whether a node changes a tensor: a method with an underscore behind its name, or an operator's own."""
+    if node.op == "call_method":
+        return str(node.target).endswith("_")
+    return node.op == "call_function" and node.target in _WRITING
 
 
 def _is(operand: Worth, number: float) -> bool:
@@ -72,3 +83,4 @@ def _kind(node: Node) -> Any:
 
 
 _RULES = {operator.mul: _product, operator.truediv: _quotient, operator.add: _sum, operator.sub: _difference}
+_WRITING = {operator.setitem, operator.iadd, operator.isub, operator.imul, operator.itruediv}

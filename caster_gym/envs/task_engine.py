@@ -15,6 +15,7 @@ from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
 from caster_gym.envs.block_layout import (
+    CONDITIONING,
     ENDINGS,
     FIRST_POSE,
     FIRST_RECORD,
@@ -22,6 +23,11 @@ from caster_gym.envs.block_layout import (
     FIRST_TERM,
     FIXED_REPORT_ROWS,
     HEADING_SIN,
+    LEFT_CORRIDOR,
+    NOT_FINITE,
+    POSITION_ERROR,
+    TOUCHED,
+    TRACTION_USE,
 )
 from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.observation import ObservationLayout
@@ -251,16 +257,16 @@ class TaskEngine:
 
         Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
         """
-        row: Any = reports if reports.ndim > 1 else reports.tolist()
+        row: Any = reports if reports.ndim > 1 else reports.tolist()  # numbers of one robot are Python's own
         columns = reports.T
         return {
-            "position_error": row[3],
+            "position_error": row[POSITION_ERROR],
             "heading_error": row[HEADING_SIN],
             "reward_terms": dict(zip(self.plan.terms, row[_TERMS], strict=False)),
             "torque": columns[_TORQUES],
             "power": row[FIRST_RECORD],
-            "traction_use": row[6],
-            "conditioning": row[7],
+            "traction_use": row[TRACTION_USE],
+            "conditioning": row[CONDITIONING],
             "pose": columns[_POSE],
             "reference_pose": columns[_REFERENCE_POSE],
             "progress": row[FIRST_SITUATION],
@@ -269,9 +275,9 @@ class TaskEngine:
             "impacts": row[FIRST_RECORD + 6],
             "impulse": columns[_IMPULSE],
             "normal_impulse": row[FIRST_RECORD + 3],
-            "left_corridor": row[0] > 0.0,
-            "not_finite": row[1] > 0.0,
-            "touched": row[2] > 0.0,
+            "left_corridor": row[LEFT_CORRIDOR] > 0.0,
+            "not_finite": row[NOT_FINITE] > 0.0,
+            "touched": row[TOUCHED] > 0.0,
         }
 
     def scene(self, robot: int) -> Scene:

@@ -331,7 +331,7 @@ def _step_single(held: Any, action: Any, observation: Any, report: Any) -> bool:
 
 def _step_blocks(first: Any, end: Any, world: World, actions: Any, views: Views, sizes: Sizes) -> None:
     desk = np.zeros(desk_rows(sizes) * LANES)  # of this thread; lanes without a robot hold numbers too
-    _take_parameters(0, 0, LANES, desk, _borrowed_world(world), sizes)
+    _take_parameters(0, 0, LANES, desk, _borrowed_world(world), sizes)  # for good, if all blocks share them
     for i in range(first, end):
         step_block(i, world, actions, views, desk, sizes)
 

@@ -162,6 +162,8 @@ class TorchTask:
         wrench (robots, 3): external, at C, in B [N, N, N m].
         """
         commands = self._commands(actions, len(state.clocks))
+        if wrench is not None and wrench.shape != (len(state.clocks), 3):
+            raise ValueError(f"wrench must have shape {(len(state.clocks), 3)}, got {tuple(wrench.shape)}")
         doubt = (commands - commands).sum(0)  # not a number where a command is none
         push = doubt.expand(3, -1) if wrench is None else doubt + wrench.to(self.dtype).T
         given = Given(commands, push, self.parameters)
@@ -278,8 +280,10 @@ class TorchTask:
         fresh = self._differentiable(fresh)
         nothing = self._empty(self._record_rows, len(clocks)).requires_grad_(fresh.bodies.requires_grad)
         outcome, progress, room = self._look(fresh.bodies, nothing, clocks, paths, fresh.progress, self.parameters)
-        fresh = fresh._replace(progress=progress, room=room).detached()
-        return fresh, TaskOutcome(*(tensor.detach() for tensor in outcome))
+        fresh = fresh._replace(progress=progress, room=room)
+        if self._compiled:
+            return fresh.detached(), TaskOutcome(*(tensor.detach() for tensor in outcome))
+        return fresh, outcome
 
     def _differentiable(self, state: TaskState) -> TaskState:
         """The state as the compiled parts want it in all periods of a window: without a past they were other ones."""

@@ -24,7 +24,8 @@ class TorchVectorEnv:
     `CasterTrackVectorEnv` ("track") and `CasterFollowVectorEnv` ("follow"). `reset` and `step` return new tensors on
     the device at every call: observations (num_envs, size) and rewards (num_envs,) in `dtype`, `terminated` and
     `truncated` (num_envs,) as booleans, and infos with the same keys. Robots whose episode ends start a new one in the
-    same step: what they saw last is in info["final_obs"] and info["final_info"], true where info["_final_obs"] is.
+    same step: what they saw last is in info["final_obs"] and info["final_info"], true where info["_final_obs"] is. (On
+    a CPU these are the observations and infos themselves in steps where nobody's ends.)
 
     No gradients pass: `TorchTask`, in `task`, is the same as a differentiable function. Nothing waits for the device
     where there are no obstacles, hence actions are not checked: one that is not a number ends its robot's episode as
