@@ -26,7 +26,10 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from tqdm import tqdm
 
 from caster_gym.agents.actor import Actor
-from caster_gym.agents.evaluation import bare, training_batch
+from caster_gym.agents.bundle import load_bundle
+from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
+from caster_gym.agents.metrics import yardstick
+from caster_gym.agents.protocol import Agent
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.settings import (
     ComputedTorqueSettings,
@@ -42,10 +45,12 @@ from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_t
 from caster_gym.agents.training import Run, learn_with_sb3, make_learner
 from caster_gym.engines.threads import set_threads
 from scripts.speed_timing import RATE, Row, middle, run
-from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, WindowCosts, write_page
+from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page
 
 BANK = 64  # steps drawn beforehand
 GOAL = 5e-3  # [m] position RMSE on validation paths
+STARTS = 4  # of a trained policy on each test path
+TEST_SEED = 1000  # of these starts; the benchmark's own
 VALIDATIONS = 50  # of each run, evenly spread, so that times to the goal can be told apart
 WINDOWS = 30  # of which the medians are taken
 ROUNDS = 3  # likewise
@@ -182,7 +187,17 @@ def train_timed(name: str, task: TaskSettings, settings: LearnedSettings, seed: 
         timed = TimedRun(Path(folder), task, settings, seed, bar)
         way_of_learning(settings)(timed, settings)
         timed.logger.close()
-    return Course(name, seed, tuple(timed.points))
+        return Course(name, seed, tuple(timed.points), trials(task, load_bundle(Path(folder) / "best").agent))
+
+
+def trials(task: TaskSettings, agent: Agent) -> tuple[Trial, ...]:
+    """Episodes of an agent on all test paths, from the benchmark's starts and some more."""
+    batch = test_batch(task, task.test, STARTS)
+    how = yardstick(bare(batch).task)
+    episodes = roll_out(agent, batch, TEST_SEED)
+    metrics = how.measure(episodes, how.settling)
+    told = zip(episodes.names, metrics.position_rmse.tolist(), metrics.failed.tolist(), strict=True)
+    return tuple(Trial(path, error, failed > 0.0) for path, error, failed in told)
 
 
 def way_of_learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:

@@ -28,12 +28,21 @@ class Point(NamedTuple):
     verdict: Verdict
 
 
+class Trial(NamedTuple):
+    """One episode of a trained policy on a test path."""
+
+    path: str
+    position_rmse: float  # [m]
+    failed: bool
+
+
 class Course(NamedTuple):
     """A training run."""
 
     learner: str
     seed: int
     points: tuple[Point, ...]
+    trials: tuple[Trial, ...] = ()  # of its best policy
 
     def first(self, goal: float) -> Point | None:
         """The validation that first meets the goal, a position RMSE [m], without a failure."""
@@ -104,6 +113,16 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
             table(HEADS, _rows(results, occasion.goal)),
             *(_compilation(name, one, results, occasion.goal) for name, one in results.costs.items()),
         ]
+    if any(one.trials for one in results.courses):
+        parts += [
+            "## On test paths",
+            paragraph(
+                """The best policy of each seed on the paths of the benchmark: random ones that it has never seen, and
+                shapes unlike any that it was trained on. Validation, on random paths alone, does not tell of
+                those."""
+            ),
+            table(("learner", "paths", "failed episodes", "position RMSE of the others, median"), _trials(results)),
+        ]
     parts += ["## What limits each learner", _limits(results)]
     parts += ["## How it was measured", _origin(results, occasion, folder)]
     return "\n\n".join(parts) + "\n"
@@ -141,6 +160,19 @@ def _rows(results: Results, goal: float) -> list[tuple[str, ...]]:
             lines.append((f"**{name}**", reached, periods, f"**{middle(seconds):.1f}** ({_range(seconds)}) s", ends))
         else:
             lines.append((f"**{name}**", reached, "", "", ends))
+    return lines
+
+
+def _trials(results: Results) -> list[tuple[str, ...]]:
+    """A line for each learner and kind of path."""
+    lines = []
+    for name in results.agents:
+        trials = [one for course in results.courses if course.learner == name for one in course.trials]
+        for kind in dict.fromkeys(one.path.split()[0] for one in trials):
+            own = [one for one in trials if one.path.split()[0] == kind]
+            errors = [1e3 * one.position_rmse for one in own if not one.failed]
+            told = f"{middle(errors):.2f} mm" if errors else ""
+            lines.append((name, kind.replace("_", " "), f"{len(own) - len(errors)} of {len(own)}", told))
     return lines
 
 

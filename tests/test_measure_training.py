@@ -24,7 +24,7 @@ from scripts.measure_training import (
     train_timed,
     window_costs,
 )
-from scripts.training_page import Course, Occasion, Point, Results, WindowCosts, page
+from scripts.training_page import Course, Occasion, Point, Results, Trial, WindowCosts, page
 
 PATH = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3, "count": 2}
 CONTENT = {kind: [{**PATH, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
@@ -184,3 +184,12 @@ def test_mistakes_are_named():
         main(["--agents", "computed_torque"])
     with pytest.raises(ValueError, match="the goal is one of tracking, got a task of environment 'follow'"):
         main(["--task", "follow"])
+
+
+def test_failures_on_test_paths_are_told_for_each_kind():
+    """Errors are those of episodes that did not fail."""
+    trials = (Trial("random_paths 0", 1e-3, False), Trial("random_paths 1", 3e-3, False), Trial("circle", 0.4, True))
+    text = told(PPO[0]._replace(trials=trials), PPO[1]._replace(trials=(Trial("circle", 2e-3, False),)))
+    assert "| ppo | random paths | 0 of 2 | 2.00 mm |" in text
+    assert "| ppo | circle | 1 of 2 | 2.00 mm |" in text
+    assert "On test paths" not in told(PPO[0])
