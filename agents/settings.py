@@ -176,7 +176,7 @@ class SHACSettings(Learner, OnTensors):
     critic_learning_rate: PositiveFloat = 5e-3
     robots: PositiveInt = 64
     window: PositiveInt = 16  # control periods through which a gradient passes
-    restarts: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2  # share of the robots that start anew before a window
+    restarts: Annotated[float, Field(ge=0.0, le=1.0)] = 0.05  # share of the robots that start anew before a window
     critic_batch: PositiveInt = 256
     critic_epochs: PositiveInt = 4
     trace: Fraction = 0.95  # λ of the critic's targets

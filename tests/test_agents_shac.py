@@ -224,9 +224,9 @@ def test_settings_that_come_with_the_package():
     assert isinstance(read_agent("shac"), SHACSettings)
 
 
-def test_a_missing_compiler_is_named_with_the_setting(monkeypatch):
-    monkeypatch.setattr(torch._inductor.config.cpp, "cxx", ("no-such-compiler",))
-    with pytest.raises(ValueError, match=r"compile=true needs a C\+\+ compiler, and none was found.*compile=false"):
+def test_a_missing_compiler_is_named_with_the_setting():
+    wanted = r"compile=true needs a C\+\+ compiler, and none was found.*compile=false"
+    with torch._inductor.config.patch({"cpp.cxx": ("no-such-compiler",)}), pytest.raises(ValueError, match=wanted):
         make_task(TASK, parse(SHACSettings, {**FIELDS, "compile": True}, "agent"))
     assert not make_task(TASK, parse(SHACSettings, FIELDS, "agent")).diagnostics
 
