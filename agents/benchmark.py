@@ -33,7 +33,8 @@ from .settings import (
 )
 from .summary import Result, table, write_episodes, write_summary
 from .track_metrics import TrackVerdict
-from .training import Validation, train, verdict_on
+from .training import train
+from .training_run import Validation, verdict_on
 
 
 class Job(NamedTuple):

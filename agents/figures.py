@@ -13,7 +13,7 @@ from caster_gym.render.palette import SERIES as COLOURS
 
 from .evaluation import Episodes
 from .measuring import Printed, shown
-from .training import Validation
+from .training_run import Validation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

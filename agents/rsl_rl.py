@@ -14,7 +14,7 @@ from caster_gym.envs.torch_vector_env import TorchVectorEnv
 from .actor import Actor
 from .settings import RslPPOSettings
 from .tensors import torch_fields
-from .training import Run
+from .training_run import Run
 
 try:
     from rsl_rl.env import VecEnv

@@ -20,7 +20,7 @@ from caster_gym.envs.torch_task import TaskOutcome, TorchTask
 from .actor import Actor
 from .settings import SHACSettings, TaskSettings
 from .tensors import check_compiler, torch_fields
-from .training import Run
+from .training_run import Run
 
 MOMENTA = (0.7, 0.95)  # of the policy's Adam, as the paper has them: gradients through a simulator scatter little
 

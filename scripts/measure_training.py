@@ -31,6 +31,7 @@ from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_ba
 from caster_gym.agents.metrics import yardstick
 from caster_gym.agents.protocol import Agent
 from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
 from caster_gym.agents.settings import (
     ComputedTorqueSettings,
     LearnedSettings,
@@ -42,7 +43,7 @@ from caster_gym.agents.settings import (
     read_settings,
 )
 from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_task
-from caster_gym.agents.training import Run, learn_with_sb3, make_learner
+from caster_gym.agents.training_run import Run
 from caster_gym.engines.threads import set_threads
 from scripts.speed_timing import RATE, Row, middle, run
 from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page

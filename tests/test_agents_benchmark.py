@@ -30,7 +30,7 @@ from caster_gym.agents.settings import (
     read_settings,
 )
 from caster_gym.agents.track_metrics import TrackMetrics, TrackVerdict, measure
-from caster_gym.agents.training import VALIDATION_SEED
+from caster_gym.agents.training_run import VALIDATION_SEED
 from caster_gym.configuration import ConfigurationError
 
 test_batch.__test__ = False  # a name that pytest would take for a test

@@ -14,8 +14,8 @@ from caster_gym.agents.actor import Actor
 from caster_gym.agents.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_bundle, save_bundle
 from caster_gym.agents.evaluation import roll_out
 from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.sb3_learning import actor_of, make_learner
 from caster_gym.agents.settings import PPOSettings, SACSettings
-from caster_gym.agents.training import actor_of, make_learner
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.follow_task import FollowTask

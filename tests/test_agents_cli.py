@@ -178,7 +178,7 @@ def test_ctrl_c_ends_quietly_and_keeps_what_was_learned(call, tmp_path, monkeypa
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("caster_gym.agents.training.Watcher._watch", interrupted)
+    monkeypatch.setattr("caster_gym.agents.sb3_learning.Watcher._watch", interrupted)
     result = call("train", "ppo", *TINY, "--task", "task.yaml", "--out", "run")
     assert result.exit_code == 130
     assert "interrupted" in result.stderr

@@ -14,7 +14,7 @@ from caster_gym.agents.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.figures import draw_learning, draw_obstacles, draw_path, draw_speeds, learning_curves
 from caster_gym.agents.follow_metrics import FollowVerdict
 from caster_gym.agents.settings import TaskSettings
-from caster_gym.agents.training import Validation
+from caster_gym.agents.training_run import Validation
 from caster_gym.configuration import parse
 
 test_batch.__test__ = False  # a name that pytest would take for a test
