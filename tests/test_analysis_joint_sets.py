@@ -6,13 +6,15 @@ from math import comb
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.analysis.joint_sets import (
     classify,
     classify_all,
     least_singular_value,
-    proved_bounds,
+    proved_brackets,
+    rounded_down,
     set_types,
     steepest,
     turned_parallel,
@@ -242,15 +244,48 @@ def test_no_turn_changes_the_singular_value_faster_than_the_bound():
     assert 0.4 < fastest <= 1.0  # and the bound is of the right size
 
 
-def test_bounds_hold_for_all_sets():
-    """(L7): those of larger sets are lent by smaller ones."""
+def test_brackets_hold_for_all_sets_and_are_attained():
+    """(L7), whether a set was searched itself or a smaller set lent its bound."""
     robot = load_robot("chung2008")
     sets = classify_all(robot)
-    bounds = proved_bounds(robot, sets)
-    assert set(bounds) == {one.joints for one in sets if one.singular == "never"}
+    brackets = proved_brackets(robot, sets)
+    assert set(brackets) == {one.joints for one in sets if one.singular == "never"}
     steering = np.random.default_rng(2).uniform(-np.pi, np.pi, (5000, 3))
-    for joints, bound in bounds.items():
-        assert 0.5 < bound <= smallest_singular_value(robot, steering, joints).min()
+    for joints, bracket in brackets.items():
+        assert 0.5 < bracket.lower <= smallest_singular_value(robot, steering, joints).min()
+        assert smallest_singular_value(robot, bracket.steering, joints) == pytest.approx(bracket.upper, abs=1e-12)
+        assert bracket.upper - bracket.lower <= 0.02 + 1e-12  # the precision asked for
+
+
+def test_all_six_joints_have_a_bound_of_their_own():
+    """Four of them lend 0.715 at most, while the least that any search finds for all six is 1.2988."""
+    robot = load_robot("chung2008")
+    six = [one for one in classify_all(robot) if len(one.joints) in (4, 6)]
+    bracket = proved_brackets(robot, six)[robot.joints]
+    found = least_by_scipy(robot, robot.joints)
+    assert bracket.lower <= found <= bracket.upper + 1e-6
+    assert bracket.lower > 1.27
+
+
+def least_by_scipy(robot, joints) -> float:
+    """The least smallest singular value from local searches by another method, from many places."""
+    starts = np.random.default_rng(3).uniform(-np.pi, np.pi, (30, robot.caster_count))
+    return min(
+        minimize(lambda x: float(smallest_singular_value(robot, x, joints)), start, method="Nelder-Mead").fun
+        for start in starts
+    )
+
+
+def test_a_search_that_stops_early_still_proves_its_bound():
+    whole, early = (least_singular_value(CHUNG, CHUNG.joints, most_cells=most) for most in (None, 20_000))
+    assert 0.0 < early.lower < whole.lower <= whole.upper <= early.upper
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [(0.71526, "0.715"), (0.71499, "0.714"), (1.0, "1.000"), (0.9999, "0.999")]
+)
+def test_a_bound_is_never_rounded_up(bound, words):
+    assert rounded_down(bound) == words
 
 
 @pytest.mark.parametrize(

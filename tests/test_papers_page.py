@@ -59,8 +59,8 @@ def section(name="curve", tag="E3"):
 
 def test_page_holds_verdicts_tables_and_figures(tmp_path):
     page = write_page("paper", "A paper", "Somebody, 2001.", [section()], tmp_path)
-    assert "1 of 2 printed numbers and statements agree" in page
-    assert "Checks of our own stand apart; 1 of 1 hold." in page
+    assert "1 of 2 printed numbers and statements agree; 1 differs, for 1 reason (E3)." in page
+    assert "stand apart; 1 of 1 hold." in page
     assert "Checks of our own:\n\n| what | expected | found | verdict | remark |" in page
     assert page.index("| (2) |") < page.index("Checks of our own:") < page.index("| by hand | 0.5 | 0.5 | pass |")
     assert "| (2) | always | sometimes | **fail** | E3: not when it rains |" in page
@@ -82,7 +82,7 @@ def test_the_file_of_checks_tells_which_are_our_own(tmp_path):
 
 def test_a_page_without_checks_of_our_own_does_not_speak_of_them(tmp_path):
     plain = section()._replace(checks=(check_number("(1)", "3", 3.0),))
-    assert "our own" not in write_page("paper", "A paper", "", [plain], tmp_path)
+    assert "of our own" not in write_page("paper", "A paper", "", [plain], tmp_path)
 
 
 def failing(remark, own=False):
@@ -119,9 +119,36 @@ def test_differences_of_all_papers_stand_in_the_order_of_their_numbers(tmp_path)
         (tmp_path / name).mkdir()
         write_page(name, name, "", [section(name=tag, tag=tag) for tag in tags], tmp_path / name)
     page = differences_page(tmp_path, ("one", "two", "not reproduced yet"))
-    assert page.index("## [one]") < page.index("| E2 |") < page.index("| E10 |") < page.index("## [two]")
-    assert page.index("## [two]") < page.index("| E3 |")
+    assert page.index("| E2 | [one](one.md) |") < page.index("| E3 | [two](two.md) |") < page.index("| E10 |")
     assert "it rained" in page
+
+
+def of_nature(tag, nature):
+    one = section(name=tag, tag=tag)
+    return one._replace(differences=tuple(difference._replace(nature=nature) for difference in one.differences))
+
+
+def test_differences_are_parted_by_what_the_scan_may_have_done(tmp_path):
+    (tmp_path / "chung2008").mkdir()
+    sections = [of_nature("E3", "print"), of_nature("E2", "scan, possibly"), of_nature("E1", "reading")]
+    write_page("chung2008", "", "", sections, tmp_path / "chung2008")
+    page = differences_page(tmp_path, ("chung2008",))
+    assert page.index("scanned text") < page.index("## What the print must have wrong (1)") < page.index("| E3 |")
+    assert page.index("| E3 |") < page.index("## What the scan may have garbled (1)") < page.index("| E2 |")
+    assert "| possibly |" in page
+    assert page.index("| E2 |") < page.index("## What depends on the reading (1)") < page.index("| E1 |")
+    assert page.index("| E1 |") < page.index("## Repaired without counting")
+
+
+def test_a_page_counts_each_reason_once_and_readings_apart(tmp_path):
+    twice = [of_nature("E3", "print"), *[of_nature("E3", "print")._replace(tables=(), pictures=())]]
+    sections = [*twice, of_nature("E1", "reading")]
+    page = write_page("paper", "A paper", "", sections, tmp_path)
+    assert (
+        "3 of 6 printed numbers and statements agree; 2 differ, for 1 reason (E3); "
+        "1 depends on the reading, for 1 reason (E1)."
+    ) in page
+    assert "| (2) | always | sometimes | depends on the reading | E1: not when it rains |" in page
 
 
 def test_numbers_in_tables_have_four_digits():

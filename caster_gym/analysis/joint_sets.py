@@ -139,11 +139,14 @@ def turned_parallel(robot: Robot, joints: str | Sequence[str], angle: float) -> 
     return tuple(angles)
 
 
-def least_singular_value(robot: Robot, joints: str | Sequence[str], precision: float = 0.02) -> Bracket:
+def least_singular_value(
+    robot: Robot, joints: str | Sequence[str], precision: float = 0.02, most_cells: int | None = None
+) -> Bracket:
     """The smallest singular value's least value over all steering angles, proved to within a precision. (L7)
 
     Branch and bound over the angles of the casters with named joints: precise for two of them in a tenth of a second,
-    slow for four. Raises ValueError for a precision that is not positive.
+    slow for four. It stops early before it looks at more than `most_cells` cells at once; its lower bound is proved all
+    the same, and only further from the upper one. Raises ValueError for a precision that is not positive.
     """
     if not precision > 0.0:
         raise ValueError(f"precision must be positive, got {precision}")
@@ -161,6 +164,8 @@ def least_singular_value(robot: Robot, joints: str | Sequence[str], precision: f
             least, best = float(values.min()), steering[values.argmin()]
         bounds = np.maximum(values - slope * half, 0.0)
         open_cells = bounds < least - precision
+        if most_cells is not None and np.count_nonzero(open_cells) * len(corners) > most_cells:
+            open_cells[:] = False
         lower = min(lower, float(bounds[~open_cells].min(initial=np.inf)))
         half *= 0.5
         centres = (centres[open_cells, None, :] + half * corners).reshape(-1, len(moving))
@@ -174,18 +179,59 @@ def steepest(robot: Robot, joints: str | Sequence[str]) -> float:
     return float(np.sqrt(sum(1.0 + (c.x**2 + c.y**2) / length**2 for c in casters)))  # (L7)
 
 
-def proved_bounds(robot: Robot, sets: Sequence[JointSet], precision: float = 0.02) -> dict[tuple[str, ...], float]:
-    """Below what the smallest singular value never falls, for each of the given sets that is never singular. [-]
+def proved_brackets(
+    robot: Robot, sets: Sequence[JointSet], precision: float = 0.02, most_cells: int = 500_000
+) -> dict[tuple[str, ...], Bracket]:
+    """The least of the smallest singular value of each of the given sets that is never singular. [-]
 
-    A set within it that is never singular lends a larger one its bound: more lines never lessen a singular value. Only
-    sets without such a set are searched, by `least_singular_value`.
+    A set within it that is never singular lends a larger one its bound: more lines never lessen a singular value. A set
+    is searched by `least_singular_value` if it has no such lender, or if a quick search finds no value within the
+    precision of what is lent. Where that takes more than `most_cells` cells at once, as for most sets of four casters,
+    bounds may lie further below the value found than the precision.
     """
-    bounds: dict[tuple[str, ...], float] = {}
+    brackets: dict[tuple[str, ...], Bracket] = {}
     for one in sorted((one for one in sets if one.singular == "never"), key=lambda one: len(one.joints)):
-        lent = [bound for joints, bound in bounds.items() if set(joints) < set(one.joints)]
-        found = max(lent) if lent else least_singular_value(robot, one.joints, precision).lower
-        bounds[one.joints] = found
-    return bounds
+        lenders = [bracket for joints, bracket in brackets.items() if set(joints) < set(one.joints)]
+        if not lenders:
+            brackets[one.joints] = least_singular_value(robot, one.joints, precision)
+            continue
+        lent = max(bracket.lower for bracket in lenders)
+        found, steering = _least_found(robot, one.joints, [bracket.steering for bracket in lenders])
+        lower = lent
+        if found - lent > precision:
+            searched = least_singular_value(robot, one.joints, precision, most_cells)
+            lower = max(lent, searched.lower)
+            if searched.upper < found:
+                found, steering = searched.upper, searched.steering
+        brackets[one.joints] = Bracket(lower, found, steering)
+    return brackets
+
+
+_SAMPLES, _KEPT, _ROUNDS, _SHRINKING = 5000, 20, 40, 0.75  # of the quick search; its last steps are below 1e-4 rad
+
+
+def _least_found(
+    robot: Robot, joints: tuple[str, ...], starts: Sequence[tuple[float, ...]]
+) -> tuple[float, tuple[float, ...]]:
+    """A small smallest singular value, and where [rad]: random samples, the best of them moved downhill."""
+    rng = np.random.default_rng(0)
+    count = robot.caster_count
+    places = rng.uniform(-np.pi, np.pi, (_SAMPLES, count))
+    places[: len(starts)] = np.array(starts)
+    step = 1.0  # [rad]
+    for _ in range(_ROUNDS):
+        values = smallest_singular_value(robot, places, joints)
+        kept = places[np.argsort(values)[:_KEPT]]
+        tried = kept[:, None, :] + step * rng.standard_normal((_KEPT, _KEPT, count))
+        places = np.concatenate([kept, tried.reshape(-1, count)])
+        step *= _SHRINKING
+    values = smallest_singular_value(robot, places, joints)
+    return float(values.min()), tuple(map(float, places[values.argmin()]))
+
+
+def rounded_down(bound: float) -> str:
+    """A lower bound with three decimals that it still reaches."""
+    return f"{np.floor(1e3 * bound) / 1e3:.3f}"
 
 
 def set_types(robot: Robot, sets: Sequence[JointSet]) -> tuple[tuple[JointSet, ...], ...]:

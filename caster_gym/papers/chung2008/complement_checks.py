@@ -155,7 +155,9 @@ def agreement(complements: tuple[OrthogonalComplement, ...]) -> tuple[tuple[Chec
         "P*_φφφ becomes a zero array",
         "off-axis term (D1)",
         f"the paper's own complement (27), with true twists, agrees with (D1) to {exact:.0e} and differs from the "
-        f"printed model by {found}, median and middle 80 % of {len(share)} random motions with |ν| = 1",
+        f"printed model by {found}, median and middle 80 % of {len(share)} random motions with vx² + vy² + ω² = 1 "
+        "in SI units; the size of a force is the root of F_x² + F_y² + (M_z/L)², with L the root mean square "
+        "distance of the pivots from C",
     )
 
 

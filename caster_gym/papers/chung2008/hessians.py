@@ -131,6 +131,7 @@ def _differences(sample: Sample) -> tuple[Difference, ...]:
             "[G] φ̈",
             f"a velocity cannot be added to accelerations: off by up to {as_printed:.2g} at |u̇| ≈ 1; with φ̈ the "
             f"equation holds for the joint accelerations of the mechanics within {mended:.0e}",
+            nature="scan, probably",
         ),
         Difference(
             "E12",

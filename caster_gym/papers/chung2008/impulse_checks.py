@@ -91,7 +91,7 @@ def equation_checks(model: Model) -> list[Check]:
             "(60)",
             f"Fig. 16 at (0.1 m, 0): {right:.2f} N s; (60) gives {elsewhere:.2f}",
             False,
-            "E16: right only if the line of impact passes C, or if n is given its arm about C",
+            "E16: right if the line of impact passes C, or if n is a vector of three with its arm about C",
         ),
     ]
 
@@ -180,9 +180,11 @@ def differences(model: Model) -> tuple[Difference, ...]:
         Difference(
             "E16",
             "(57) to (60)",
-            "u̇ is the velocity of the contact point, and the impulse acts along n in the space of u̇",
-            "true if the line of impact passes C; at a point P, (C1): n = (n_x, n_y, P_x n_y − P_y n_x)",
+            "the impulse acts along the surface normal n in the space of u̇, called the velocity of the contact point",
+            "true if n is a vector of three, (C1): n = (n_x, n_y, P_x n_y − P_y n_x) at a point P; with a plain normal "
+            "only if the line of impact passes C. The paper does not tell which n it means",
             f"Fig. 16, wall with n = (0, 1) met at P = (0.1 m, 0): {right:.2f} N s; by (60) {printed:.2f} N s",
+            nature="reading",
         ),
     )
 

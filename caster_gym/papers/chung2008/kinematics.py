@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from caster_gym.analysis import mobility
 from caster_gym.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
-from caster_gym.analysis.joint_sets import JointSet, classify_all, proved_bounds
+from caster_gym.analysis.joint_sets import JointSet, classify_all, proved_brackets, rounded_down
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
@@ -92,7 +92,7 @@ def _motor_check(sets: tuple[JointSet, ...]) -> Check:
 
 def _motor_difference(sample: Sample, sets: tuple[JointSet, ...]) -> Difference:
     enough = _fewest(sets)
-    bounds = proved_bounds(sample.robot, enough)
+    bounds = [bracket.lower for bracket in proved_brackets(sample.robot, enough).values()]
     every = [s.singular for s in sets if len(s.joints) == MORE_THAN + 1]
     return Difference(
         "E27",
@@ -101,7 +101,7 @@ def _motor_difference(sample: Sample, sets: tuple[JointSet, ...]) -> Difference:
         "four are enough, two on each of two wheels, as the same sentence goes on and kim2001, III says",
         f"of all {len(sets)} sets of joints the smallest without singularity have {len(enough[0].joints)}: "
         f"{', '.join(in_letters(s.joints) for s in enough)}, smallest singular value of unit lines at least "
-        f"{min(bounds.values()):.2f} everywhere (L7); {every.count('never')} of {len(every)} sets of five have none "
+        f"{rounded_down(min(bounds))} everywhere (L7); {every.count('never')} of {len(every)} sets of five have none "
         "either",
     )
 
@@ -197,6 +197,7 @@ def _difference(sample: Sample) -> Difference:
         "− (l/2) r cos φ₂",
         f"as printed η̇₂ is off by up to {found.by:.3g} rad/s per rad/s of ω, and the rows break η̇ + φ̇ = ω by as much "
         f"({broken:.3g}); corrected it is the inverse of (13) within {corrected:.0e}",
+        "scan, possibly",
     )
 
 

@@ -214,7 +214,7 @@ def _difference(residuals: list[Residual]) -> Difference:
         "off-axis term (D1)",
         "momenta of all bodies, differentiated along the motions: the printed model's force is off by up to "
         f"{max(r.printed / r.force for r in own):.1%} of the greatest force, the exact one's by "
-        f"{max(r.exact / r.force for r in own):.0e}",
+        f"{max(r.exact / r.force for r in own):.0e} (sizes as in the row above)",
     )
 
 

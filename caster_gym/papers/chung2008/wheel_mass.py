@@ -206,7 +206,9 @@ def _ellipse_checks(results: dict[str, Result]) -> tuple[Check, ...]:
                 "drastically compared to the circular trajectory",
                 f"{relative:.1%} beside {there:.1%}; {same.effect[k]:.1%} with the robot of the circle",
                 bool(relative > there),
-                "" if relative > there else "E15: the wheels are 25 % of this platform, and 60 % of the circle's",
+                ""
+                if relative > there
+                else "E15: the paper names no measure; the wheels are 25 % of this platform, 60 % of the circle's",
             )
         )
     larger = along.peaks[-1] / around.peaks[-1]
@@ -230,11 +232,13 @@ def _difference(results: dict[str, Result]) -> Difference:
         "E15",
         "V, Figs. 13 to 15",
         "as the wheel mass increases, the forces in x, y and θ_z increase drastically compared to the circle",
-        "in newtons all three do; in proportion the force in y changes less than on the circle, since the wheels are "
-        "25 % of the platform here and 60 % there",
+        "true in newtons and newton metres, as the figures are drawn; relative to the force without wheels, a measure "
+        "that the paper does not use, the force in y changes less than on the circle, since the wheels are 25 % of the "
+        "platform here and 60 % there",
         "Greatest change from no wheels to the heaviest over the greatest force without, in x, y, θ_z: "
         f"{_shares(along.effect)} on the ellipse with its platform of 20 kg, {_shares(around.effect)} on the circle. "
         f"With the circle's robot on the ellipse it is {_shares(same.effect)}: the path makes it larger in all three.",
+        nature="reading",
     )
 
 

@@ -64,8 +64,9 @@ def three_joints() -> Section:
             "for every demand",
             f"for {both.sum()} of 25",
             bool(both.all()),
-            "" if both.all() else f"E24: another type is better than one of them where {beaten}",
+            "" if both.all() else f"E24: Table 1 lists winners; another type is better than one of them where {beaten}",
         ),
+        _rolling_joints_check(),
         workspace_check(),
         Check(
             "IV: a finer interval than 5° does not improve the accuracy much",
@@ -83,7 +84,8 @@ The sentence that describes this grid cannot be read as it stands. {len(GRID)} v
 {", ".join(f"{x:g}" for x in GRID)}, times a. These are the tenths of a, then 10^(k/10) in two digits, with 3.9
 instead of 4. The 3.9 is no misprint: {_why_not_398()}.
 
-The columns are headed v_max/ω_max and hold ω_max/v_max in units of 1/a (E8). So read, {right} of the {len(every_cell)}
+The columns of Table 1 are headed v_max/ω_max, those of Table 2 σ_min/σ_max in the scanned text; both hold ω_max/v_max
+in units of 1/a (E8). So read, {right} of the {len(every_cell)}
 printed indices agree to their last digit; as headed, {as_headed} would. (The same numbers come out if the heads are
 right and the first matrix of (31) was inverted; the text of section V speaks for the heads being wrong.) The
 {len(wrong)} others are in Table 1 (E9): {kept} of their designs are the optima, but the index there is another.
@@ -115,12 +117,13 @@ The best set is of type 4 or 5 for {either} of 25 demands. That both are better 
                 "matrices that cannot be read",
                 "G* = diag(1/vx_max, 1/vy_max, 1/ω_max) G diag(φ̇_1max, φ̇_2max, φ̇_3max)",
                 f"so read, {right} of {len(every_cell)} printed indices agree to their last digit",
+                nature="scan, probably",
             ),
             Difference(
                 "E8",
-                "heads of Tables 1 and 2; IV, text",
+                "head of Table 1; IV, text",
                 "v_max/ω_max",
-                "ω_max/v_max, in 1/a, as section V says",
+                "ω_max/v_max, in 1/a, as section V says; the head of Table 2, σ_min/σ_max in the scan, means the same",
                 f"{right} of {len(every_cell)} printed indices agree, {as_headed} with the columns as headed; the "
                 f"0.369 of the text is {example:.4f}, and would be {headed_example:.4f} for v_max/ω_max = 0.5a",
             ),
@@ -135,10 +138,35 @@ The best set is of type 4 or 5 for {either} of 25 demands. That both are better 
                 "E24",
                 "IV, on Table 1",
                 "types 5 and 4 have better global isotropic performance than the other sets",
-                f"one of the two is the best for {either} of 25 demands; both beat the others for {both.sum()}",
+                f"true of the winners, which are all that Table 1 lists: one of the two is the best for {either} of 25 "
+                f"demands. That both beat all others holds for {both.sum()}",
                 _who_is_beaten(greatest, both),
+                nature="reading",
+            ),
+            Difference(
+                "E29",
+                "IV, before 1.",
+                "the five sets contain more than one rolling joint",
+                "one or more: types 3 and 5 of Table 1 have one",
+                "rolling joints of types 1 to 5: " + ", ".join(map(str, _rolling_joints())),
             ),
         ),
+    )
+
+
+def _rolling_joints() -> list[int]:
+    """Number of rolling joints in each type of Table 1."""
+    return [sum(joint.startswith("roll") for joint in joints) for joints in TYPES.values()]
+
+
+def _rolling_joints_check() -> Check:
+    counts = _rolling_joints()
+    return Check(
+        "IV: rolling joints in the five sets that are compared",
+        "more than one",
+        ", ".join(f"{count} in type {kind}" for kind, count in zip(TYPES, counts, strict=True)),
+        min(counts) > 1,
+        "E29: at least one is meant, since only (φ_1, φ_2, φ_3) is left out",
     )
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from caster_gym.analysis.joint_sets import JointSet, classify_all, proved_bounds, set_types
+from caster_gym.analysis.joint_sets import Bracket, JointSet, classify_all, proved_brackets, rounded_down, set_types
 from caster_gym.analysis.singular_lines import kind_and_caster, smallest_singular_value
 from caster_gym.papers.kim2001.joint_set_lattice import CLASSES, joint_set_lattice
 from caster_gym.papers.notation import KIM2001, in_letters, in_words, kim2001_robot
@@ -19,19 +19,19 @@ ROUNDING = 1e-12  # [-] smallest singular values at configurations that geometry
 
 
 class Classified(NamedTuple):
-    """A robot, all its sets of joints, their types, and proved bounds for those that are never singular."""
+    """A robot, all its sets of joints, their types, and the least σ of those that are never singular."""
 
     robot: Robot
     sets: tuple[JointSet, ...]
     types: tuple[tuple[JointSet, ...], ...]
-    bounds: dict[tuple[str, ...], float]
+    least: dict[tuple[str, ...], Bracket]
 
 
 def classified(name: str) -> Classified:
     """Everything about the joint sets of a robot that comes with the package."""
     robot = load_robot(name)
     sets = classify_all(robot)
-    return Classified(robot, sets, set_types(robot, sets), proved_bounds(robot, sets))
+    return Classified(robot, sets, set_types(robot, sets), proved_brackets(robot, sets))
 
 
 def section() -> Section:
@@ -58,8 +58,9 @@ rolling joint alone can put its line through every point, a steering joint alone
 away from its pivot, both joints of one caster only through points that the wheel's centre can reach; and parallel lines
 need all casters to have at most one driven joint. So a set is singular somewhere exactly if its casters can agree on a
 point or a direction, which takes no search (docs/analysis.md, section L). Each "somewhere" comes with a configuration
-and its smallest singular value σ, each "never" with a bound on σ over all steering angles, proved by branch and bound;
-"always" are here the sets of fewer than three joints.
+and its smallest singular value σ, each "never" with a bound on σ over all steering angles, proved by branch and bound,
+and with the least σ that was found; the truth lies between the two. Bounds of large sets of four casters are those of
+sets within them, since a search would take hours. "always" are here the sets of fewer than three joints.
 
 The {len(three.sets)} sets of the robot of chung2008, which has the shape of this paper's, are of {len(three.types)}
 types under its symmetry. The statements of section III hold: all sets of three joints are singular somewhere, and of
@@ -96,13 +97,14 @@ def _checks(three: Classified) -> tuple[Check, ...]:
 def _differences(three: Classified) -> tuple[Difference, ...]:
     two_wheels = next(one for one in three.sets if one.singular == "never")
     number, _ = _three_joint_types()
+    bound = rounded_down(three.least[two_wheels.joints].lower)
     return (
         Difference(
             "E22",
             "abstract and section V",
             "no singularity with more than two wheels that have two active joints",
             "with two or more, as section III says",
-            f"{in_letters(two_wheels.joints)}, as in section V: σ ≥ {three.bounds[two_wheels.joints]:.3f} everywhere",
+            f"{in_letters(two_wheels.joints)}, as in section V: σ ≥ {bound} everywhere",
         ),
         Difference(
             "E23",
@@ -110,6 +112,7 @@ def _differences(three: Classified) -> tuple[Difference, ...]:
             "six sets, of which five are listed",
             "the one not listed is (θ_1, φ_1, θ_2), type 4 of Table 1",
             f"the sets of three joints are of {number} types under the symmetry of the robot",
+            nature="scan, probably",
         ),
     )
 
@@ -124,7 +127,7 @@ def _count_table(robots: Sequence[Classified]) -> Table:
     return Table("joint_sets_counts", "How many sets of joints are singular always, somewhere, never.", columns, rows)
 
 
-_EVIDENCE = ("lines meet at x, y [m]", "σ there", "σ everywhere ≥")
+_EVIDENCE = ("lines meet at x, y [m]", "σ there", "σ everywhere ≥", "least σ found")
 
 
 def _type_table(one: Classified) -> Table:
@@ -179,14 +182,15 @@ def _whole_casters(one: JointSet) -> int:
     return sum(count == 2 for count in Counter(kind_and_caster(joint)[1] for joint in one.joints).values())
 
 
-def _evidence(one: Classified, joint_set: JointSet) -> tuple[str, str, str]:
-    """Where the lines meet, σ there, and the bound below σ everywhere, as words."""
+def _evidence(one: Classified, joint_set: JointSet) -> tuple[str, str, str, str]:
+    """Where the lines meet, σ there, the proved bound below σ everywhere, and the least σ found, as words."""
     if joint_set.singular == "never":
-        return "", "", f"{one.bounds[joint_set.joints]:.3f}"
+        bracket = one.least[joint_set.joints]
+        return "", "", rounded_down(bracket.lower), f"{bracket.upper:.3f}"
     if joint_set.singular == "always":
-        return "", "0", ""
+        return "", "0", "", ""
     where = "parallel" if joint_set.point is None else f"{joint_set.point[0]:.4f}, {joint_set.point[1]:.4f}"
-    return where, f"{_value(one.robot, joint_set):.0e}", ""
+    return where, f"{_value(one.robot, joint_set):.0e}", "", ""
 
 
 def _value(robot: Robot, one: JointSet) -> float:

@@ -169,6 +169,7 @@ def _differences(sample: Sample, rows_of_37: str) -> tuple[Difference, ...]:
             "b r cos φ₃",
             f"as printed η̇₃ is off by up to {third.by:.3g} per unit of ω, and the rows break η̇ + φ̇ = ω by as much "
             f"({broken:.3g}); corrected it is the inverse of (17) within {mended:.0e}",
+            "scan, possibly",
         ),
         Difference(
             KIM2001_THREE.tag,
@@ -177,6 +178,7 @@ def _differences(sample: Sample, rows_of_37: str) -> tuple[Difference, ...]:
             "d r − b r cos φ₃",
             f"the text takes the third row of (22), where b stands; as printed φ̇₃ is off by up to {three.by:.3g} per "
             "unit of ω",
+            "scan, possibly",
         ),
         Difference(
             KIM2001_FOUR.tag,

@@ -100,6 +100,7 @@ def _conditions() -> Difference:
         "φ̇_max/θ̇_max = 1, ω_max/v_max = 0.5/a",
         f"a is a length, and the index must not depend on its unit: for a = {' and '.join(f'{a:g} m' for a in sizes)} "
         f"it is {right} with the corrected conditions at r = d = 0.1a, and {printed} with the printed ones",
+        nature="scan, probably",
     )
 
 

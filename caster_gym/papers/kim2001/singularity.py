@@ -111,6 +111,7 @@ def _differences(phi: Array) -> tuple[Difference, ...]:
             f"off by up to {printed:.0f} at {len(phi)} random configurations, where the determinant reaches "
             f"{_worst(np.linalg.det(ours)):.0f}; by {corrected:.0e} corrected. It is not the determinant of (24) as "
             f"printed either, off by up to {of_printed_24:.0f}",
+            nature="scan, possibly",
         ),
         Difference(
             "E19",
@@ -118,6 +119,7 @@ def _differences(phi: Array) -> tuple[Difference, ...]:
             "u̇ = [G_a^u] φ̇_a with (24)",
             "φ̇_a = [G_u^a] u̇ with (24), as in (36); then (25) is its inverse",
             f"our map from twist to joint rates times the inverse of (24), corrected, is 1 to {identity:.0e}",
+            nature="scan, probably",
         ),
         Difference(
             "E20",
@@ -125,6 +127,7 @@ def _differences(phi: Array) -> tuple[Difference, ...]:
             "the wheel axis when θ_i is an input",
             "the wheel axis when φ_j is an input; θ_i belongs to the first kind, the line of the steering link",
             f"with axles for φ_j the determinant is {_worst(_on_lines()):.0e} on lines that meet or are parallel",
+            nature="scan, probably",
         ),
         Difference(
             "E21",
@@ -132,6 +135,7 @@ def _differences(phi: Array) -> tuple[Difference, ...]:
             "(θ_1, φ_1, θ_2, θ_3) twice",
             "(θ_1, φ_1, φ_2, θ_3) the second time",
             "the four kinds listed before it have θθ, θφ, φθ and φφ on the other two casters",
+            nature="scan, probably",
         ),
     )
 
