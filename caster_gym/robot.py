@@ -60,10 +60,10 @@ class Caster(Frozen):
     def _wheel_trails(cls, trail: Any) -> Any:
         if trail == 0 and not isinstance(trail, bool):
             raise ValueError(
-                "must be greater than 0: a wheel without trail, as in a swerve module, is another mechanism, which "
-                "rolling cannot steer and which holds its pivot from moving sideways, so that its robot has other "
-                "degrees of freedom; if the wheel of your module does stand behind its steering axis, as it does on "
-                "many, give that distance, else this package has no model of it"
+                f"must be greater than 0, got {trail}: a wheel without trail, as in a swerve module, is another "
+                "mechanism, which rolling cannot steer and which holds its pivot from moving sideways, so that its "
+                "robot has other degrees of freedom; if the wheel of your module does stand behind its steering axis, "
+                "as it does on many, give that distance, else this package has no model of it"
             )
         return trail
 

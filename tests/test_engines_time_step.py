@@ -39,11 +39,12 @@ def changed(name, **fields):
         if key == "coulomb_speed":
             content[key] = value
             continue
+        joint, _, kind = key.partition("_")
         for caster in content["casters"]:
-            joint, _, kind = key.partition("_")
-            (caster[joint] if kind and joint in ("roll", "steer") else caster)[
-                kind if joint in ("roll", "steer") else key
-            ] = value
+            if joint in ("roll", "steer"):
+                caster[joint][kind] = value
+            else:
+                caster[key] = value
     return Robot.model_validate(content)
 
 
@@ -54,7 +55,7 @@ STIFF = {
     "dry": changed("xr4000", steer_coulomb=2.0),
     "sharp": changed("tidybot2", coulomb_speed=0.01),
     "strong": changed("chung2008", roll_max_torque=100.0),
-    "slow motors": changed("xr4000", roll_max_speed=0.05),
+    "slow motors": changed("xr4000", roll_max_speed=0.2),
     "geared": changed("chung2008", gear=((0.1, 0.0), (0.0, 1.0))),
     "fast steering": changed("chung2008", steer_max_speed=1000.0),
     "short trail": changed("xr4000", trail=0.005),
@@ -135,15 +136,15 @@ def test_the_bound_of_friction_is_that_of_stability(field):
     found = limits(rows)
     assert found.friction[0] / 2.785 > 3.0 * max(found.turning[0], 2.0 * found.motors[0])  # friction it is
     rng = np.random.default_rng(0)
-    angles = rng.uniform(-np.pi, np.pi, (3, 4000))  # the stiffest posture is nearly among them
+    angles = rng.uniform(-np.pi, np.pi, (3, 600))  # the stiffest posture is nearly among them
     grown = []
     for share in (0.97, 1.06):
         h = share * found.longest[0]
-        push = 1e-9 * rng.normal(size=(3, 4000))
+        push = 1e-9 * rng.normal(size=(3, 600))
         state = State((0.0, 0.0), (1.0, 0.0), tuple(push), tuple((np.cos(a), np.sin(a)) for a in angles))
         energy = [kinetic_energy(state.twist, state.directions, stiff)]
         nothing = ((0.0, 0.0),) * 3
-        for _ in range(200):
+        for _ in range(60):
             state, _ = driven_step(state, nothing, (0.0, 0.0, 0.0), h, stiff)
         energy.append(kinetic_energy(state.twist, state.directions, stiff))
         grown.append((energy[1] > energy[0]).any())
@@ -196,12 +197,12 @@ def test_the_number_of_substeps_that_a_refusal_names_would_do(case):
     with pytest.raises(ValueError, match="cannot follow"):
         CasterTrackEnv(robot, PATH, substeps=count - 1)
     greatest = []
-    for substeps in (count, min(3 * count, 1000)):
+    for substeps, steps in ((count, 1000), (3 * count, 300)):
         env = CasterTrackEnv(robot, PATH, substeps=substeps, corridor=1e6)
         observation, _ = env.reset(seed=0)
         rng = np.random.default_rng(0)
         energies = []
-        for _ in range(1000):
+        for _ in range(steps):
             action = rng.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32)
             observation, reward, terminated, truncated, info = env.step(action)
             assert np.isfinite(observation).all()
@@ -212,7 +213,7 @@ def test_the_number_of_substeps_that_a_refusal_names_would_do(case):
             if terminated or truncated:
                 env.reset()
         greatest.append(max(energies))
-    assert greatest[0] < 3.0 * greatest[1]  # motions part in time; what they reach does not
+    assert greatest[0] < 4.0 * greatest[1]  # motions part in time, and the shorter one has seen less
 
 
 def test_where_no_number_of_substeps_would_do_something_else_is_named_that_does():
@@ -224,7 +225,7 @@ def test_where_no_number_of_substeps_would_do_something_else_is_named_that_does(
         str(caught.value),
     )
     CasterTrackEnv(changed("chung2008", roll_max_torque=float(found.group(1))), PATH)
-    CasterTrackEnv(robot, PATH, control_period=float(found.group(2)), substeps=1000)
+    CasterTrackEnv(robot, {"shape": "circle", "radius": 0.5}, control_period=float(found.group(2)), substeps=1000)
 
 
 def test_the_number_to_blame_is_named():
@@ -263,10 +264,10 @@ def test_every_robot_of_a_batch_is_looked_at():
 @pytest.mark.parametrize(
     "features",
     [
-        [Friction(added_viscous=(0.0, 0.5))],
+        [Friction(added_viscous=(0.0, 3.0))],
         [Friction(coulomb_scale=(1.0, 40.0))],
         [Friction(added_coulomb=(0.0, 1.0)), WheelErrors(trail=(-0.005, 0.0))],
-        [Payload(mass=(0.0, 20.0)), Friction(added_viscous=(0.0, 0.5))],
+        [Payload(mass=(5.0, 20.0)), Friction(added_viscous=(0.0, 3.0))],
         [WheelErrors(radius=(0.0, 0.05))],
     ],
 )
@@ -296,3 +297,14 @@ def test_features_within_reach_of_the_step_pass():
 
 def test_substeps_are_as_few_as_a_period_allows():
     assert [substeps_for(0.02, longest) for longest in (0.02, 0.0199, 0.01, 0.005, 1.0)] == [1, 2, 2, 4, 1]
+
+
+def test_numbers_that_no_robot_has_are_refused():
+    rows = columns([load_robot("chung2008")] * 2)
+    rows[1, 7] = np.nan
+    with pytest.raises(ValueError, match="numbers must be finite, got nan as number 8"):
+        longest_of_rows(rows)
+    rows[1] = rows[0]
+    rows[1, 0] = -50.0  # kg
+    with pytest.raises(ValueError, match="needs positive masses and inertias"):
+        longest_of_rows(rows)

@@ -54,7 +54,7 @@ REFUSED = {
     "negative wheel mass": (lambda r: r["casters"][0]["wheel"].update(mass=-1.0), ["wheel.mass", "-1"]),
     "zero trail": (
         lambda r: r["casters"][0].update(trail=0),
-        ["caster 1: 'trail' must be greater than 0", "swerve module", "behind its steering axis"],
+        ["caster 1: 'trail' must be greater than 0, got 0", "swerve module", "behind its steering axis"],
     ),
     "misspelt key": (rename_trail, ["caster 2: unknown key 'trial'", "did you mean 'trail'"]),
     "key too much": (lambda r: r.update(colour="red"), ["colour"]),

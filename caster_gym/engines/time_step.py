@@ -69,9 +69,20 @@ def longest_of_robots(robots: Sequence[Robot]) -> Array:
 
 
 def longest_of_rows(rows: Array) -> Array:
-    """Longest time steps (R,) that follow robots of given numbers (R, fields). [s]"""
+    """Longest time steps (R,) that follow robots of given numbers (R, fields). [s]
+
+    Raises ValueError for numbers that are not finite, and for inertias so small that rounding hides them.
+    """
+    if not np.isfinite(rows).all():
+        row, field = np.argwhere(~np.isfinite(rows))[0]
+        raise ValueError(f"a robot's numbers must be finite, got {rows[row, field]} as number {field + 1}")
     distinct, back = np.unique(rows, axis=0, return_inverse=True)
-    parts = [limits(distinct[i : i + _TOGETHER]).longest for i in range(0, len(distinct), _TOGETHER)]
+    try:
+        parts = [limits(distinct[i : i + _TOGETHER]).longest for i in range(0, len(distinct), _TOGETHER)]
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            "a robot needs positive masses and inertias: its inertia matrix is not positive definite"
+        ) from None
     return np.concatenate(parts)[back.reshape(-1)]
 
 
@@ -101,8 +112,8 @@ def _remedies(row: Array, field: str | None, time_step: float, longest: float) -
     ways = []
     if field is not None and (enough := _enough(row, field, time_step)) is not None:
         ways.append(f"a {_key(field)!r} of at most {enough} {_unit(field)} in every caster")
-    if MOST_SUBSTEPS * longest > SHORTEST_PERIOD:
-        ways.append(f"a 'control_period' of {_rounded_down(MOST_SUBSTEPS * longest)} s in {MOST_SUBSTEPS} 'substeps'")
+    if MOST_SUBSTEPS * longest >= SHORTEST_PERIOD:
+        ways.append(f"a 'control_period' of {_round(MOST_SUBSTEPS * longest)} s in {MOST_SUBSTEPS} 'substeps'")
     return f"; what would do is {' or '.join(ways)}" if ways else ""
 
 
@@ -144,6 +155,13 @@ def _key(field: str) -> str:
 
 def _unit(field: str) -> str:
     return _UNITS[field.partition("_")[2] or field]
+
+
+def _round(value: float) -> str:
+    """1, 2 or 5 in the first digit of a positive number that is no more than it: other times are multiples of that."""
+    unit = 10.0 ** math.floor(math.log10(value))
+    digit = max(digit for digit in (1, 2, 5) if digit * unit <= value * (1.0 + _ROUNDING))
+    return f"{digit * unit:g}"
 
 
 def _rounded_down(value: float) -> str:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from caster_gym.envs.task_engine import TaskEngine
 
 EVERYONE = slice(None)
-_TRIED = 64  # draws of the plants that are checked beforehand
+_TRIED = 32  # draws of the plants that are checked beforehand
 
 
 class Stack:
