@@ -104,8 +104,8 @@ def _mass_doubts(caster: "Caster", platform: float) -> Iterator[_Doubt]:
             wheel.mass,
             "kg",
             5e-4 * ball,
-            5.0 * ball,
-            f"where a ball of steel of its radius has {ball:.2g} kg; usual are 0.05 … 1 of that",
+            max(5.0 * ball, 0.5 * platform),
+            f"where a ball of steel of its radius has {ball:.2g} kg and the platform {platform:g} kg",
         )
         usual = f"where mass · radius² is {square:.2g} kg m²; usual are"
         yield from _outside(
