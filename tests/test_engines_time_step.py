@@ -264,10 +264,10 @@ def test_every_robot_of_a_batch_is_looked_at():
 @pytest.mark.parametrize(
     "features",
     [
-        [Friction(added_viscous=(0.0, 3.0))],
+        [Friction(added_viscous=(0.0, 10.0))],
         [Friction(coulomb_scale=(1.0, 40.0))],
         [Friction(added_coulomb=(0.0, 1.0)), WheelErrors(trail=(-0.005, 0.0))],
-        [Payload(mass=(5.0, 20.0)), Friction(added_viscous=(0.0, 3.0))],
+        [Payload(mass=(5.0, 20.0)), Friction(added_viscous=(0.0, 10.0))],
         [WheelErrors(radius=(0.0, 0.05))],
     ],
 )
