@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from caster_gym import load_robot
+from caster_gym.engines.time_step import longest_time_step, substeps_for
 from caster_gym.envs.torch_task import TaskOutcome, TorchTask
 
 from .actor import Actor
@@ -192,13 +193,7 @@ def make_task(task: TaskSettings, settings: SHACSettings) -> TorchTask:
 def _fewest_substeps(task: TaskSettings) -> int:
     """RK4 steps of a control period: as few as the robot's casters allow, at most the task's own."""
     robot = load_robot(task.robot)
-    for count in range(1, task.task.substeps):
-        try:
-            robot.check_time_step(task.task.control_period / count)
-        except ValueError:
-            continue
-        return count
-    return task.task.substeps
+    return min(substeps_for(task.task.control_period, longest_time_step(robot)), task.task.substeps)
 
 
 def learn_through_simulator(run: Run, settings: SHACSettings) -> None:

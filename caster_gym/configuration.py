@@ -113,11 +113,10 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         place, message, value = _complaint(problem, model)
         told = complaints.setdefault((place, value), [])
         told += [message] if message not in told else []
-    sentences = [
-        place + " or ".join([first, *(other.lstrip(": ") for other in others)]) + value
-        for (place, value), (first, *others) in complaints.items()
-    ]
-    return "; ".join(sentences)
+    places: dict[str, list[str]] = {}  # by what is wrong there, which is told once
+    for (place, value), (first, *others) in complaints.items():
+        places.setdefault(" or ".join([first, *(other.lstrip(": ") for other in others)]) + value, []).append(place)
+    return "; ".join(", ".join(where) + wrong for wrong, where in places.items())
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.plausibility import warn_if_implausible
 
 
 class Motor(Frozen):
@@ -54,6 +55,18 @@ class Caster(Frozen):
         (0.0, 1.0),
     )  # motor speeds = gear · joint rates
 
+    @field_validator("trail", mode="before")
+    @classmethod
+    def _wheel_trails(cls, trail: Any) -> Any:
+        if trail == 0 and not isinstance(trail, bool):
+            raise ValueError(
+                f"must be greater than 0, got {trail}: a wheel without trail, as in a swerve module, is another "
+                "mechanism, which rolling cannot steer and which holds its pivot from moving sideways, so that its "
+                "robot has other degrees of freedom; if the wheel of your module does stand behind its steering axis, "
+                "as it does on many, give that distance, else this package has no model of it"
+            )
+        return trail
+
     @field_validator("gear")
     @classmethod
     def _gear_is_invertible(cls, gear: tuple[tuple[float, float], tuple[float, float]]) -> Any:
@@ -61,6 +74,13 @@ class Caster(Frozen):
         if abs(a * d - b * c) < 1e-9 * max(abs(a * d), abs(b * c), 1e-9):
             raise ValueError("must be invertible: two motors that turn together cannot drive two joints")
         return gear
+
+    @property
+    def top_speed(self) -> float:
+        """Speed of the wheel that rolls straight ahead at the top speed of the slower of the motors it turns. [m/s]"""
+        (roll, _), (steer, _) = self.gear
+        geared = ((self.roll, roll), (self.steer, steer))
+        return self.radius * min(motor.max_speed / abs(ratio) for motor, ratio in geared if ratio != 0.0)
 
 
 class Footprint(Frozen):
@@ -82,6 +102,19 @@ class Footprint(Frozen):
                 raise ValueError("must be a convex polygon with its corners listed counter-clockwise")
         return self
 
+    @property
+    def reach(self) -> float:
+        """Distance of the outline's farthest point from C. [m]"""
+        return self.disc or float(np.hypot(*np.asarray(self.polygon).T).max())
+
+    @property
+    def area(self) -> float:
+        """Area inside the outline. [m²]"""
+        if self.disc is not None:
+            return float(np.pi * self.disc**2)
+        x, y = np.asarray(self.polygon).T
+        return float(0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+
 
 class Platform(Frozen):
     """The platform without its casters."""
@@ -100,6 +133,7 @@ class Robot(Frozen):
     casters: Annotated[tuple[Caster, ...], Field(min_length=2)]
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
     floor_friction: PositiveFloat = 0.7  # [-] between wheels and floor; tells how much of it is used
+    coulomb_speed: PositiveFloat = 0.1  # [rad/s] rate of a joint below which its dry friction fades to zero
 
     @field_validator("actuation", mode="before")
     @classmethod
@@ -116,6 +150,7 @@ class Robot(Frozen):
         places = {(caster.x, caster.y) for caster in self.casters}
         if len(places) < 2:
             raise ValueError("at least two casters must stand at different places")
+        warn_if_implausible(self)
         return self
 
     @property
@@ -136,7 +171,7 @@ class Robot(Frozen):
     @property
     def top_speed(self) -> float:
         """Speed of the fastest wheel at its motor's top speed. [m/s]"""
-        return max(caster.radius * caster.roll.max_speed for caster in self.casters)
+        return max(caster.top_speed for caster in self.casters)
 
     def with_actuation(self, actuation: str | tuple[str, ...] | list[str]) -> "Robot":
         """The same robot with other joints driven: "all" or their names."""
@@ -158,19 +193,6 @@ class Robot(Frozen):
             for caster in self.casters
         ]
         return self.model_copy(update={"casters": tuple(casters)})
-
-    def check_time_step(self, time_step: float) -> None:
-        """Refuse a time step [s] that cannot follow a caster: steering relaxes at the rate speed/trail.
-
-        The step may be as long as trail/speed: RK4 is stable up to 2.8 times that.
-        """
-        longest = min(caster.trail for caster in self.casters) / self.top_speed
-        if not 0.0 < time_step <= longest * (1.0 + 1e-9):
-            raise ValueError(
-                f"a time step of {time_step:g} s cannot follow the casters of robot {self.name!r}: with a trail of "
-                f"{min(caster.trail for caster in self.casters):g} m and a top speed of {self.top_speed:g} m/s it must "
-                f"be positive and at most {longest:.3g} s"
-            )
 
 
 def joint_names(caster_count: int) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from caster_gym import Robot, load_robot
 from caster_gym.papers.drawing import COLOURS, new_figure
+from scripts.dry_friction import LOAD, PERIOD, SECONDS, SPEEDS, Creep, creep, creep_table
 from scripts.mujoco_robot import (
     DURATION,
     OUR_STEP,
@@ -119,7 +120,7 @@ def draw_convergence(file: Path, comparisons: list[Comparison]) -> None:
     figure.savefig(file, dpi=150)
 
 
-def page(comparisons: list[Comparison], folder: str, command: str) -> str:
+def page(comparisons: list[Comparison], creeps: list[Creep], folder: str, command: str) -> str:
     """The comparison as Markdown; pictures and tables lie in a folder beside it."""
     coarse, fine = 1e3 * STEPS[0], 1e3 * STEPS[-1]
     heads = (
@@ -163,7 +164,7 @@ def page(comparisons: list[Comparison], folder: str, command: str) -> str:
             f"""Each robot is driven {draws} times from rest for {DURATION:g} s, with wheels askew and constant torques,
             drawn so that each joint pushes the floor with up to {100.0 * STRONG:.0f} % of the weight on its wheel and
             no motor outruns its top speed. Compared is where the platform ends. Dry friction in the joints is left out,
-            since MuJoCo's jumps at rest where ours passes smoothly."""
+            since MuJoCo's jumps at rest where ours passes smoothly: see below."""
         ),
         "\n".join(lines),
         f"Medians over the drives, least and greatest in brackets; [all of them]({folder}/convergence.csv).",
@@ -180,10 +181,34 @@ def page(comparisons: list[Comparison], folder: str, command: str) -> str:
             the dotted line does: the exact model is its limit. Orange levels off: without (D1) the equations describe
             another robot.*"""
         ),
+        *dry_friction(creeps),
         f"- Command: `{command}`\n- Ours: RK4 at {1e3 * OUR_STEP:g} ms\n"
         f"- Versions: Python {platform.python_version()}, {libraries}\n",
     ]
     return "\n\n".join(parts)
+
+
+def dry_friction(creeps: list[Creep]) -> list[str]:
+    """What a load does that dry friction ought to hold, as paragraphs; none for robots without dry friction."""
+    if not creeps:
+        return []
+    return [
+        "## Dry friction does not hold",
+        paragraph(
+            f"""Dry friction of a joint is `coulomb` · rate / √(rate² + `coulomb_speed`²): it passes smoothly through
+            zero, so that time steps can follow it, and a joint below its breakaway creeps instead of standing. Under a
+            share s of the torque at which it would break away, it turns at s / √(1 − s²) of `coulomb_speed`. Below, all
+            casters trail and each rolling joint is driven by {100.0 * LOAD:g} % of its `coulomb` for {SECONDS:g} s.
+            MuJoCo holds its joints by a constraint, and creeps by the softness of its contacts and constraints."""
+        ),
+        creep_table(creeps),
+        paragraph(
+            f"""In brackets: the fewest `substeps` of a control period of {1e3 * PERIOD:g} ms that follow the robot.
+            `coulomb_speed` is a number of the robot's file, {SPEEDS[0]:g} rad/s unless it says otherwise. A smaller one
+            makes a sharper law and asks for shorter time steps; too long ones are refused, with the number of substeps
+            that would do. Ask a sharp law whether a robot stands still under a load; for driving the usual one does."""
+        ),
+    ]
 
 
 def paragraph(text: str) -> str:
@@ -209,11 +234,12 @@ def main(arguments: list[str] | None = None) -> None:
     robots = [without_dry_friction(load_robot(name)) for name in chosen.robots]
     pairs = [(robot, drive) for robot in robots for drive in strong_drives(robot, chosen.draws)]
     comparisons = [compare(robot, drive) for robot, drive in tqdm(pairs, file=sys.stderr)]
+    creeps = [creep(robot) for robot in map(load_robot, chosen.robots) if robot.casters[0].roll.coulomb > 0.0]
     chosen.out.mkdir(parents=True, exist_ok=True)
     write_table(chosen.out / "convergence.csv", comparisons)
     draw_convergence(chosen.out / "convergence.png", comparisons)
     command = shlex.join(["python", "-m", "scripts.mujoco_peer", *(sys.argv[1:] if arguments is None else arguments)])
-    chosen.out.with_suffix(".md").write_text(page(comparisons, chosen.out.name, command), encoding="utf-8")
+    chosen.out.with_suffix(".md").write_text(page(comparisons, creeps, chosen.out.name, command), encoding="utf-8")
 
 
 if __name__ == "__main__":

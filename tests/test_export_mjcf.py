@@ -103,3 +103,11 @@ def test_command_names_an_unknown_robot(tmp_path):
     assert result.exit_code == 2
     assert "unknown robot 'tidybot3'" in result.output
     assert not list(tmp_path.iterdir())
+
+
+def test_the_model_says_where_its_dry_friction_differs():
+    """Half of the breakaway torque turns a joint by coulomb_speed / √3: 0.1 rad/s · 50.8 mm / 1.732 = 2.93 mm/s."""
+    assert "lets wheels creep at 2.9 mm/s" in mjcf(load_robot("tidybot2"), 2e-3)
+    sharper = load_robot("tidybot2").model_copy(update={"coulomb_speed": 0.01})
+    assert "lets wheels creep at 0.29 mm/s" in mjcf(sharper, 2e-3)
+    assert "frictionloss holds" not in mjcf(load_robot("chung2008"), 2e-3)  # has no dry friction

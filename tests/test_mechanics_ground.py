@@ -36,7 +36,9 @@ def test_newtons_law_holds_for_the_whole_robot(robot):
     eta, _, _ = Model(robot).rates(steering, twist)
     outside = wrench.copy()
     for i, (f, caster) in enumerate(zip(directions(steering), robot_parameters(robot).casters, strict=True)):
-        along, across = ground_force(tuple(twist), tuple(rate), f, caster, (torque[2 * i], torque[2 * i + 1]))
+        along, across = ground_force(
+            tuple(twist), tuple(rate), robot.coulomb_speed, f, caster, (torque[2 * i], torque[2 * i + 1])
+        )
         x, y = wheel_centre(f, caster)
         fx, fy = along * f[0] - across * f[1], along * f[1] + across * f[0]
         outside += [fx, fy, x * fy - y * fx - caster.scrub * eta[i]]
@@ -50,7 +52,7 @@ def test_a_robot_at_rest_pushes_the_floor_by_its_torques_alone():
     _, _, torque, _ = random_motion(44, robot)
     for i, caster in enumerate(robot_parameters(robot).casters):
         roll, steer = torque[2 * i], torque[2 * i + 1]
-        along, across = ground_force((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.6, 0.8), caster, (roll, steer))
+        along, across = ground_force((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1, (0.6, 0.8), caster, (roll, steer))
         assert_allclose(along, roll / caster.radius, rtol=1e-12)
         # balance of moments about the pivot: steering torque, and the force at the arm (−d, s)
         assert_allclose(steer - caster.trail * across - caster.offset * along, 0.0, atol=1e-12)

@@ -8,7 +8,7 @@ def test_every_number_of_a_robot_arrives_in_its_field():
     robot = random_robot(121, 3).with_actuation(("roll_1", "steer_1", "roll_2"))
     parameters = robot_parameters(robot)
     platform, given = parameters.platform, robot.platform
-    assert platform == (given.mass, given.inertia, *given.com, robot.floor_friction)
+    assert platform == (given.mass, given.inertia, *given.com, robot.floor_friction, robot.coulomb_speed)
     for numbers, caster in zip(parameters.casters, robot.casters, strict=True):
         assert numbers[:5] == (caster.x, caster.y, caster.trail, caster.offset, caster.radius)
         assert numbers[5:8] == (caster.wheel.mass, caster.wheel.spin_inertia, caster.wheel.yaw_inertia)

@@ -6,6 +6,7 @@ import pytest
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.export.mjcf import mjcf
+from scripts.dry_friction import creep
 from scripts.mujoco_peer import STEPS, compare, draw_convergence, page, write_table
 from scripts.mujoco_robot import joint_indices, path_length, simulate, slip, strong_drives, without_dry_friction
 from tests.random_robots import random_robot
@@ -106,6 +107,20 @@ def test_page_tells_what_was_compared(tmp_path):
     write_table(tmp_path / "convergence.csv", [one])
     draw_convergence(tmp_path / "convergence.png", [one])
     assert len((tmp_path / "convergence.csv").read_text().splitlines()) == 1 + len(STEPS)
-    text = page([one], "truth", "python -m scripts.mujoco_peer")
+    text = page([one], [creep(load_robot("xr4000"))], "truth", "python -m scripts.mujoco_peer")
     assert "| chung2008 | 1.4 " in text
     assert "In 1 of 1 drives" in text
+    assert "| xr4000 | 0.1 | " in text
+    assert "Dry friction does not hold" not in page([one], [], "truth", "")  # of robots that have none
+
+
+@pytest.mark.parametrize("name", ["tidybot2", "xr4000"])
+def test_creep_below_breakaway_is_that_of_the_law(name):
+    """s / √(1 − s²) of `coulomb_speed`; viscous friction and getting there take some of it, less of a sharper law."""
+    found = creep(load_robot(name))
+    missing = 1.0 - np.array(found.ways) / found.law
+    assert (missing > 0.0).all()
+    assert missing[0] < 0.15  # viscous · rate is 6 % of the load on xr4000, 5 % on tidybot2 at 0.06 rad/s; the start
+    assert missing[-1] < 0.01
+    assert found.substeps[0] < found.substeps[-1]
+    assert found.peer < 0.25 * found.ways[0]  # MuJoCo's constraint holds

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from caster_gym.analysis.checked import finite
 from caster_gym.analysis.frames import turned
 from caster_gym.analysis.orthogonal_complement import INDEPENDENT, OrthogonalComplement
+from caster_gym.engines.time_step import check_time_step
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -102,7 +103,7 @@ def simulate(
     """
     _check(candidates, limit)
     robot = candidates[0].robot
-    robot.check_time_step(dt)
+    check_time_step(robot, dt)
     torques = finite("torque", torque, 2 * robot.caster_count)
     start = finite("state", state, 6 + robot.caster_count)
     if torques.ndim != 2 or start.ndim != 1:

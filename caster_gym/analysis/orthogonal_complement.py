@@ -233,6 +233,7 @@ class _Numbers:
         self.armatures = np.array([j for c in casters for j in (0.0, c.roll.armature, c.steer.armature)])
         self.viscous = np.array([b for c in casters for b in (c.scrub, c.roll.viscous, c.steer.viscous)])
         self.coulomb = np.array([b for c in casters for b in (0.0, c.roll.coulomb, c.steer.coulomb)])
+        self.coulomb_speed = robot.coulomb_speed
 
     def twists(self, v: Vectors, k: Array) -> Array:
         """T, or its rate of change; k of the first caster."""
@@ -260,7 +261,7 @@ class _Numbers:
 
     def applied(self, rates: Array, torques: Array) -> Array:
         """Torques (…, 3 N) that act on all joints: the given ones less friction."""
-        tau = -joint_friction(rates, self.viscous, self.coulomb)
+        tau = -joint_friction(rates, self.viscous, self.coulomb, self.coulomb_speed)
         pairs = torques.reshape(*torques.shape[:-1], self.count, 2)
         shape = np.broadcast_shapes(tau.shape[:-1], torques.shape[:-1])
         tau = np.broadcast_to(tau, (*shape, 3 * self.count)).copy()

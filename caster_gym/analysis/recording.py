@@ -26,6 +26,7 @@ from pydantic import NonNegativeFloat
 
 from caster_gym.configuration import Frozen, did_you_mean
 from caster_gym.engines.numpy_model import Model
+from caster_gym.engines.time_step import longest_time_step, substeps_for
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import Dynamics, robot_parameters
 from caster_gym.mechanics.scalars import each, flatten, pairs
@@ -156,9 +157,8 @@ _CRUISE = 0.25  # [-] of the top speed at which the drag equals the amplitude of
 
 
 def substeps_of(robot: Robot, time_step: float) -> int:
-    """RK4 steps in a time step [s], as few as `Robot.check_time_step` lets pass."""
-    longest = min(caster.trail for caster in robot.casters) / robot.top_speed
-    return math.ceil(time_step / longest * (1.0 - 1e-9))
+    """RK4 steps in a time step [s], as few as follow the robot."""
+    return substeps_for(time_step, longest_time_step(robot))
 
 
 def write_recording(path: Path, recording: Recording) -> None:

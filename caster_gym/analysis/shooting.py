@@ -70,7 +70,7 @@ class Shooting:
         model = Model(self.robot, parameters=self._parameters(values))
         torque = self._torque.swapaxes(0, 1)
         with np.errstate(all="ignore"):
-            return model.simulate(starts, torque, self._step, len(torque)).swapaxes(0, 1)
+            return model.simulate(starts, torque, self._step, len(torque), checked=True).swapaxes(0, 1)
 
     def starts_on(self, coarser: "Shooting", path: Array) -> Array:
         """Starts of another cut of the recording, from a path of this one."""

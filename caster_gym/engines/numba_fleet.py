@@ -23,6 +23,7 @@ from caster_gym.engines.lanes import (
 from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import INLINE, compiled
 from caster_gym.engines.threads import over_blocks
+from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import pack_state, rk4_step
 from caster_gym.mechanics.parameters import (
@@ -170,6 +171,7 @@ class Fleet:
         self._distinct = list({id(robot): robot for robot in listed}.values())
         packed = {id(robot): pack_parameters(robot_parameters(robot, dynamics)) for robot in self._distinct}
         parameters = np.array([packed[id(robot)] for robot in listed])
+        self._longest = float(longest_of_robots(self._distinct).min())
         rows = self._room_row + 1 + parameters.shape[1]
         self._blocks: NDArray[np.float64] = np.zeros((block_count(self.count), rows * LANES))
         to_lanes(parameters, self._blocks, self._room_row + 1)
@@ -200,8 +202,8 @@ class Fleet:
         steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
-        for robot in self._distinct:
-            robot.check_time_step(dt)
+        if not follows(dt, self._longest):
+            check_fleet(self._distinct, dt)
         to_lanes(self._checked("torque", torque, 2 * len(self._casters)), self._blocks, self._torque_row)
         arguments = (steps, dt, self._hull, self._obstacles, self._casters)
         if self.count == 1:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.integration import State, rk4_step
-from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.robot import Robot, check_joints
@@ -39,6 +40,7 @@ class Model:
         self.robot = robot
         self.dynamics = dynamics
         self._parameters = robot_parameters(robot, dynamics) if parameters is None else parameters
+        self._rows = None if parameters is None else self._replaced(parameters)  # (robots, fields)
 
     def rates(self, steering: ArrayLike, twist: ArrayLike) -> tuple[Array, Array, Array]:
         """Yaw rates over ground η̇, rolling rates θ̇, steering rates δ̇, each (..., N). [rad/s]"""
@@ -94,7 +96,8 @@ class Model:
         """Forces (..., N, 2) of the floor on each wheel along f and f⊥, under the given joint torques. [N]"""
         directions, v, torques = self._directions(steering), self._vector("twist", twist), self._torques(torque)
         v_rate = dynamics.forward_dynamics(v, directions, torques, (0.0, 0.0, 0.0), self._parameters)
-        forces = each(ground.ground_force, (v, v_rate), directions, self._parameters.casters, torques)
+        shared = v, v_rate, self._parameters.platform.coulomb_speed
+        forces = each(ground.ground_force, shared, directions, self._parameters.casters, torques)
         return self._stack([self._stack(force) for force in forces], -2)
 
     def wheel_loads(self, steering: ArrayLike) -> Array:
@@ -142,15 +145,24 @@ class Model:
         return self._stack((j_n, j_t)), self._stack(after)
 
     def simulate(
-        self, state: ArrayLike, torque: ArrayLike, dt: float, steps: int, around: Surroundings | None = None
+        self,
+        state: ArrayLike,
+        torque: ArrayLike,
+        dt: float,
+        steps: int,
+        around: Surroundings | None = None,
+        *,
+        checked: bool = False,
     ) -> Array:
         """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
 
         torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
         around: obstacles, from `caster_gym.arena.packing.surroundings`, off which the robot bounces.
-        Angles are continuous in time. Raises ValueError if dt [s] cannot follow the casters.
+        Angles are continuous in time. Raises ValueError if dt [s] cannot follow the robot, be it of its own numbers or
+        of plain ones given in their place; not if the caller has `checked`, or looks for states that are not finite.
         """
-        self.robot.check_time_step(dt)
+        if not checked:
+            self._check_time_step(dt)
         steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
@@ -170,6 +182,12 @@ class Model:
             states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:])))
         return self._stack(states, 0)
 
+    def _check_time_step(self, dt: float) -> None:
+        if self._rows is None:
+            check_time_step(self.robot, dt)
+        else:
+            check_rows(f"robots like {self.robot.name!r} whose numbers were replaced", self._rows, dt)
+
     def _step(self, now: State, torques: tuple[tuple[Any, Any], ...], dt: float, around: Surroundings | None) -> State:
         """The state after one step of dt seconds."""
         if around is None or len(around.obstacles.radii) == 0:
@@ -178,6 +196,10 @@ class Model:
         count = len(obstacles.radii)
         state, _ = guarded_step(now, torques, (0.0, 0.0, 0.0), dt, self._parameters, hull, obstacles, 0, count)
         return state
+
+    def _replaced(self, parameters: RobotParameters) -> Array | None:
+        columns = np.broadcast_arrays(*pack_parameters(parameters))
+        return np.stack([np.ravel(column) for column in columns], axis=1)
 
     def _array(self, name: str, value: Any, last: int) -> Any:
         """The value as an array of finite numbers whose last axis has the right length."""

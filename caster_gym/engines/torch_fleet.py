@@ -7,6 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
 from caster_gym.engines.torch_compiler import compiled, replayed
 from caster_gym.engines.torch_scalars import (
     check_memory,
@@ -56,6 +57,7 @@ class TorchFleet:
         self.robots = listed_robots(robots, count)
         self.count = len(self.robots)
         self._distinct = list({id(robot): robot for robot in self.robots}.values())
+        self._longest = float(longest_of_robots(self._distinct).min())
         n = self._distinct[0].caster_count
         self._rows, self._torque_rows = BODY_ROWS + 2 * n, 2 * n
         if parameters is not None:
@@ -86,8 +88,8 @@ class TorchFleet:
         steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
-        for robot in self._distinct:
-            robot.check_time_step(dt)
+        if not follows(dt, self._longest):
+            check_fleet(self._distinct, dt)
         torques = self._checked("torque", torque, self._torque_rows).T.contiguous()
         for _ in range(steps):
             self._state = self._step(self._state, torques, float(dt), self._parameters)

@@ -31,6 +31,9 @@ class TorchModel(Model):
         self.dtype = checked_dtype(dtype)
         self.device = checked_device(device)
 
+    def _replaced(self, parameters: RobotParameters) -> None:
+        """Numbers given in place of the robot's own may be tensors whose values nobody may ask for."""
+
     def _array(self, name: str, value: Any, last: int) -> Any:
         tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)
         self._check_shape(name, tensor, last)

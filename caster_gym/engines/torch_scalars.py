@@ -8,14 +8,11 @@ import torch
 from torch import Tensor
 
 from caster_gym.mechanics.parameters import (
-    CASTER_FIELDS,
-    PLATFORM_FIELDS,
-    CasterParameters,
     Dynamics,
-    PlatformParameters,
     RobotParameters,
     pack_parameters,
     robot_parameters,
+    unpack_parameters,
 )
 from caster_gym.mechanics.scalars import register
 from caster_gym.robot import Robot
@@ -90,9 +87,4 @@ def parameter_rows(
 
 def parameters_of(rows: Tensor) -> RobotParameters:
     """Parameters whose fields are tensors (robots,), from rows (robots, fields)."""
-    columns = rows.unbind(1)
-    casters = columns[PLATFORM_FIELDS:]
-    return RobotParameters(
-        PlatformParameters(*columns[:PLATFORM_FIELDS]),
-        tuple(CasterParameters(*casters[i : i + CASTER_FIELDS]) for i in range(0, len(casters), CASTER_FIELDS)),
-    )
+    return unpack_parameters(rows.unbind(1))

@@ -14,6 +14,7 @@ from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.arena.beside import draw_beside
 from caster_gym.arena.checks import check_free
 from caster_gym.arena.packing import hull_of, pack
+from caster_gym.engines.time_step import check_time_step
 from caster_gym.envs import follow_task, track_task
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.following import FollowTerms
@@ -50,6 +51,7 @@ def track_engine(
     longest: greatest number of control periods of an episode.
     """
     chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
+    check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
         chosen, plan, _pace(task), ObservationLayout(chosen, task.preview, "s", task.nearest), count
@@ -67,6 +69,7 @@ def follow_engine(
 ) -> tuple[TaskEngine, FollowTask]:
     """The same for the following task."""
     chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
+    check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
         chosen, plan, _pace(task), ObservationLayout(chosen, task.preview, "m", task.nearest), count

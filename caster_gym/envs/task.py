@@ -5,13 +5,14 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from caster_gym.configuration import Frozen
+from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 
 
 class Task(Frozen):
     """How a path is to be walked, and what that costs."""
 
-    control_period: Annotated[float, Field(ge=1e-5, le=1.0)] = 0.02  # [s] between actions
-    substeps: Annotated[int, Field(gt=0, le=1000)] = 4  # RK4 steps in a control period
+    control_period: Annotated[float, Field(ge=SHORTEST_PERIOD, le=1.0)] = 0.02  # [s] between actions
+    substeps: Annotated[int, Field(gt=0, le=MOST_SUBSTEPS)] = 4  # RK4 steps in a control period
     corridor: PositiveFloat = 0.5  # [m] position error that ends an episode
     start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error

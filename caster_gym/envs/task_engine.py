@@ -12,6 +12,7 @@ from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.recycling import Shelf
 from caster_gym.engines.threads import over_blocks
+from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
 from caster_gym.envs.block_layout import (
@@ -87,7 +88,7 @@ class TaskEngine:
     """
 
     def __init__(self, robot: Robot, plan: Plan, pace: Pace, observed: ObservationLayout, count: int) -> None:
-        robot.check_time_step(pace.time_step)
+        check_time_step(robot, pace.time_step, pace.substeps)
         announce_compilation(kernel.restart, "the environment")
         self.robot, self.plan, self.layout, self.count = robot, plan, observed, count
         self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
@@ -236,11 +237,21 @@ class TaskEngine:
         everybody = np.broadcast_to(self._world.parameters, (block_count(self.count), self._world.parameters.shape[1]))
         return from_lanes(everybody, 0, layout.parameter_rows(self._sizes), self.count)
 
-    def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64]) -> None:
-        """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`."""
+    def check_parameters(self, rows: NDArray[np.float64], what: str | None = None) -> None:
+        """Refuse robots of numbers (robots, fields) that the time step cannot follow; what: their name in the error."""
+        called = f"robots like {self.robot.name!r} of other numbers" if what is None else what
+        check_rows(called, rows, self._pace.time_step, self._pace.substeps)
+
+    def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64], *, checked: bool = False) -> None:
+        """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`.
+
+        Raises ValueError for robots that the time step cannot follow, unless they are `checked`.
+        """
         changed = self.parameters
         if rows.shape != (len(selected), changed.shape[1]):
             raise ValueError(f"rows must have shape {(len(selected), changed.shape[1])}, got {rows.shape}")
+        if not checked and len(selected):
+            self.check_parameters(rows)
         changed[selected] = rows
         if len(self._world.parameters) < block_count(self.count):
             own = np.zeros((block_count(self.count), self._world.parameters.shape[1]))
@@ -311,7 +322,8 @@ class TaskEngine:
         parameters, now = robot_parameters(self.robot), unpack_state(tuple(state.tolist()))
         at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
         rate = forward_dynamics(now.twist, now.directions, at_joints, (0.0, 0.0, 0.0), parameters)
-        return np.array(each(ground.ground_force, (now.twist, rate), now.directions, parameters.casters, at_joints))
+        shared = now.twist, rate, parameters.platform.coulomb_speed
+        return np.array(each(ground.ground_force, shared, now.directions, parameters.casters, at_joints))
 
 
 def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -131,10 +131,14 @@ class TorchVectorEnv:
         self.set_parameters(parameter_rows(listed_robots(robots, self.num_envs), self.dtype, self.device))
 
     def set_parameters(self, rows: Tensor) -> None:
-        """Every robot's numbers (num_envs, fields), in the order of `pack_parameters`."""
+        """Every robot's numbers (num_envs, fields), in the order of `pack_parameters`.
+
+        Raises ValueError for robots that the task's time step cannot follow.
+        """
         shape = (self.num_envs, len(pack_parameters(robot_parameters(self.robot))))
         if tuple(rows.shape) != shape:
             raise ValueError(f"rows must have shape {shape}, got {tuple(rows.shape)}")
+        self.task.engine.check_parameters(rows.detach().double().cpu().numpy())
         self.task.parameters = parameters_of(rows.to(self.device, self.dtype))
 
     def _advanced(self, state: TaskState, actions: Tensor) -> tuple[TaskState, TaskOutcome, TaskOutcome]:

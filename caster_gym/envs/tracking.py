@@ -288,7 +288,8 @@ def greatest_traction(state: State, torques: tuple[tuple[Scalar, Scalar], ...], 
     """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it slips."""
     at_joints = each(joint_torques, (), torques, robot.casters)
     v_rate = forward_dynamics(state.twist, state.directions, at_joints, (0.0, 0.0, 0.0), robot)
-    forces = each(ground_force, (state.twist, v_rate), state.directions, robot.casters, at_joints)
+    shared = (state.twist, v_rate, robot.platform.coulomb_speed)
+    forces = each(ground_force, shared, state.directions, robot.casters, at_joints)
     return greatest(each(wheel_use, (robot.platform,), forces, wheel_loads(state.directions, robot)))
 
 

@@ -5,8 +5,9 @@ its solver softens over a few time steps. So it slips a little, and less with ev
 rolling without slip, the equations of caster_gym.
 
 The platform slides in x, y and z and turns about the vertical: it cannot tip, the slide in z lets its weight press the
-wheels on the floor. Rotor inertias, damping and dry friction sit at the joints, as in the robot's file. A motor acts on
-a tendon whose length is what the motor has turned, by the gear of its caster.
+wheels on the floor. Rotor inertias, damping and dry friction sit at the joints, as in the robot's file. MuJoCo's dry
+friction holds a joint that caster_gym lets creep: a comment in the model says how fast. A motor acts on a tendon whose
+length is what the motor has turned, by the gear of its caster.
 """
 
 from collections.abc import Sequence
@@ -43,7 +44,7 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
     p = robot.platform
     top = max(caster.radius for caster in robot.casters) + DRAWN_HEIGHT
     asset, outline = _outline(p.footprint, top)
-    return f"""<mujoco model={quoteattr(robot.name)}>
+    return f"""<mujoco model={quoteattr(robot.name)}>{_note_on_dry_friction(robot)}
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{_numbers(time_step)}" integrator="implicitfast" cone="elliptic"
           impratio="{_numbers(FRICTION_STIFFNESS)}"
@@ -69,6 +70,17 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
   </actuator>
 </mujoco>
 """
+
+
+def _note_on_dry_friction(robot: Robot) -> str:
+    """A comment on what MuJoCo does otherwise, for a robot with dry friction."""
+    if not any(motor.coulomb for caster in robot.casters for motor in (caster.roll, caster.steer)):
+        return ""
+    creep = 1e3 * robot.coulomb_speed * max(caster.radius for caster in robot.casters) / 3.0**0.5
+    return f"""
+  <!-- frictionloss holds a joint below its breakaway torque. In caster_gym dry friction passes smoothly through zero,
+       and half of that torque lets wheels creep at {creep:.2g} mm/s; a smaller coulomb_speed in the robot's file than
+       {robot.coulomb_speed:g} rad/s makes that less, with shorter time steps. -->"""
 
 
 def _outline(footprint: Footprint, top: float) -> tuple[str, str]:

@@ -9,8 +9,6 @@ from caster_gym.mechanics.linear import dot, multiply, solve
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Symmetric, Vector, add, each, sqrt, total
 
-COULOMB_SPEED = 0.1  # [rad/s] below which dry friction fades to zero, so that time steps can follow it
-
 
 def caster_inertias(caster: CasterParameters) -> tuple[Scalar, Scalar, Scalar]:
     """I_θθ, I_θη, I_ηη of wheel and link, referred to rolling and yaw. [kg m²]"""
@@ -52,12 +50,12 @@ def caster_bias(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
     return combine(row_theta, b_theta, row_eta, b_eta, row_delta, b_delta)  # (D4)
 
 
-def caster_resistance(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
+def caster_resistance(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
     """Generalised force that friction in one caster's joints and contact patch takes from the platform."""
     row_eta, row_theta, row_delta = rate_rows(f, caster)
     eta, theta, delta = rates(v, f, caster)
-    roll = joint_friction(theta, caster.roll_viscous, caster.roll_coulomb)
-    steer = joint_friction(delta, caster.steer_viscous, caster.steer_coulomb)
+    roll = joint_friction(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed)
+    steer = joint_friction(delta, caster.steer_viscous, caster.steer_coulomb, coulomb_speed)
     return combine(row_theta, roll, row_eta, caster.scrub * eta, row_delta, steer)
 
 
@@ -72,9 +70,9 @@ def caster_drive(f: Direction, caster: CasterParameters, torque: tuple[Scalar, S
     )
 
 
-def joint_friction(rate: Scalar, viscous: Scalar, coulomb: Scalar) -> Scalar:
+def joint_friction(rate: Scalar, viscous: Scalar, coulomb: Scalar, coulomb_speed: Scalar) -> Scalar:
     """Torque against a joint's rate: viscous, and dry with a smooth passage through zero. [N m]"""
-    return viscous * rate + coulomb * rate / sqrt(rate * rate + COULOMB_SPEED * COULOMB_SPEED)
+    return viscous * rate + coulomb * rate / sqrt(rate * rate + coulomb_speed * coulomb_speed)
 
 
 def combine(g: Vector, x: Scalar, h: Vector, y: Scalar, k: Vector, z: Scalar) -> Vector:
@@ -111,7 +109,7 @@ def bias(v: Vector, directions: tuple[Direction, ...], robot: RobotParameters) -
 
 def resistance(v: Vector, directions: tuple[Direction, ...], robot: RobotParameters) -> Vector:
     """Friction of all joints and contact patches, as the force that overcomes it."""
-    return total(each(caster_resistance, (v,), directions, robot.casters))
+    return total(each(caster_resistance, (v, robot.platform.coulomb_speed), directions, robot.casters))
 
 
 def drive_force(

@@ -11,7 +11,12 @@ LEAST_LOAD = 1e-3  # [-] of the mean load: a lifted wheel counts as barely loade
 
 
 def ground_force(
-    v: Vector, v_rate: Vector, f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]
+    v: Vector,
+    v_rate: Vector,
+    coulomb_speed: Scalar,
+    f: Direction,
+    caster: CasterParameters,
+    torque: tuple[Scalar, Scalar],
 ) -> tuple[Scalar, Scalar]:
     """Force of the floor on one wheel along f and f⊥, given the robot's twist rate. [N]"""
     row_eta, row_theta, row_delta = rate_rows(f, caster)
@@ -22,8 +27,8 @@ def ground_force(
     delta_rate = dot(row_delta, v_rate) + e_delta
     d, s, r, behind, left = caster.trail, caster.offset, caster.radius, caster.link_behind, caster.link_left
     sigma, p = s - left, d - behind
-    roll = torque[0] - joint_friction(theta, caster.roll_viscous, caster.roll_coulomb)
-    steer = torque[1] - joint_friction(delta, caster.steer_viscous, caster.steer_coulomb)
+    roll = torque[0] - joint_friction(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed)
+    steer = torque[1] - joint_friction(delta, caster.steer_viscous, caster.steer_coulomb, coulomb_speed)
     along = (roll - (caster.spin_inertia + caster.roll_armature) * theta_rate) / r  # (G1)
     a_f = r * theta_rate + sigma * eta_rate - p * eta * eta  # (G2)
     a_p = (r * theta + sigma * eta) * eta + p * eta_rate

@@ -21,6 +21,7 @@ class PlatformParameters(NamedTuple):
     com_x: Scalar  # [m]
     com_y: Scalar  # [m]
     floor_friction: Scalar  # [-] between the wheels and the floor
+    coulomb_speed: Scalar  # [rad/s] rate of a joint below which its dry friction fades to zero
 
 
 class CasterParameters(NamedTuple):
@@ -74,7 +75,7 @@ def robot_parameters(robot: Robot, dynamics: Dynamics = "exact") -> RobotParamet
     if dynamics not in ("exact", "chung2008"):
         raise ValueError(f'dynamics must be "exact" or "chung2008", got {dynamics!r}')
     p = robot.platform
-    platform = PlatformParameters(p.mass, p.inertia, p.com[0], p.com[1], robot.floor_friction)
+    platform = PlatformParameters(p.mass, p.inertia, p.com[0], p.com[1], robot.floor_friction, robot.coulomb_speed)
     casters = tuple(
         caster_parameters(caster, f"roll_{i}" in robot.driven, f"steer_{i}" in robot.driven, dynamics)
         for i, caster in enumerate(robot.casters, start=1)
@@ -140,3 +141,12 @@ def pack_parameters(robot: RobotParameters) -> tuple[Scalar, ...]:
     for caster in robot.casters:
         flat = flat + tuple(caster)
     return flat
+
+
+def unpack_parameters(flat: tuple[Scalar, ...]) -> RobotParameters:
+    """Inverse of `pack_parameters`; columns of a table make a robot of arrays."""
+    casters = flat[PLATFORM_FIELDS:]
+    return RobotParameters(
+        PlatformParameters(*flat[:PLATFORM_FIELDS]),
+        tuple(CasterParameters(*casters[i : i + CASTER_FIELDS]) for i in range(0, len(casters), CASTER_FIELDS)),
+    )

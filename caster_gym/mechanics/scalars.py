@@ -1,8 +1,10 @@
 """What the equations need besides +, −, × and ÷: choices, roots, and loops over casters, for every kind of scalar.
 
-An engine whose scalars are neither numbers nor NumPy arrays says with `register` how they choose and take roots.
-Loops over casters go through `each` and `total`, which a compiler can unroll: the number of casters is the length of a
-tuple, known before the arithmetic starts.
+Python's and NumPy's numbers and NumPy's arrays choose and take roots by themselves; whoever brings another kind of
+scalar says with `register` how it does, as the engines on Torch do. A kind that nobody registered is a TypeError: by
+its truth value or as a float it would be taken for a number that it is not. Loops over casters go through `each` and
+`total`, which a compiler can unroll: the number of casters is the length of a tuple, known before the arithmetic
+starts.
 """
 
 import math
@@ -16,26 +18,52 @@ Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Symmetric: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 Direction: TypeAlias = tuple[Scalar, Scalar]
 
-_WHERE: dict[type, Callable[[Any, Any, Any], Any]] = {np.ndarray: np.where}
-_SQRT: dict[type, Callable[[Any], Any]] = {np.ndarray: np.sqrt}
-_ANYWHERE: dict[type, Callable[[Any], Any]] = {np.ndarray: np.any}
+Where: TypeAlias = Callable[[Any, Any, Any], Any]
+Sqrt: TypeAlias = Callable[[Any], Any]
+Anywhere: TypeAlias = Callable[[Any], Any]
+
+_KINDS: dict[type, tuple[Where, Sqrt, Anywhere]] = {}  # registered, the latest last
+# What each type does, None being what Python does with a number. Subclasses are added as they come.
+_WHERE: dict[type, Where | None] = {bool: None, np.bool_: None, int: None, float: None}
+_SQRT: dict[type, Sqrt | None] = {float: None, np.float64: None, int: None, bool: None}
+_ANYWHERE: dict[type, Anywhere | None] = {bool: None, np.bool_: None, int: None, float: None}
 
 
-def register(
-    kind: type,
-    where: Callable[[Any, Any, Any], Any],
-    sqrt: Callable[[Any], Any],
-    anywhere: Callable[[Any], Any],
-) -> None:
-    """Teach `where`, `sqrt` and `anywhere` another kind of scalar, by the type of its values."""
-    _WHERE[kind] = where
-    _SQRT[kind] = sqrt
-    _ANYWHERE[kind] = anywhere
+def register(kind: type, where: Where, sqrt: Sqrt, anywhere: Anywhere) -> None:
+    """Teach `where`, `sqrt` and `anywhere` another kind of scalar and its subclasses, by the type of its values.
+
+    where(condition, yes, no): by conditions of that kind, where yes and no may be numbers. anywhere(condition): a truth
+    value, true if a condition may hold somewhere; a symbol, which has no value yet, always may.
+    """
+    _KINDS.pop(kind, None)
+    _KINDS[kind] = (where, sqrt, anywhere)
+    tables: tuple[dict[type, Any], ...] = (_WHERE, _SQRT, _ANYWHERE)
+    for table, function in zip(tables, _KINDS[kind], strict=True):
+        for known in [one for one in table if issubclass(one, kind) and one not in _KINDS]:
+            del table[known]  # looked up again, for it may be nearer to the new kind
+        table[kind] = function
+
+
+def _functions_of(value: Scalar) -> tuple[Where | None, Sqrt | None, Anywhere | None]:
+    """What a value of a type that is met for the first time does. Raises TypeError if nobody has said."""
+    for kind in reversed(_KINDS):
+        if isinstance(value, kind):
+            return _KINDS[kind]
+    if isinstance(value, np.number | np.bool_):
+        return None, None, None
+    name = f"{type(value).__module__}.{type(value).__qualname__}"
+    raise TypeError(
+        f"nobody has said how scalars of the kind {name} choose and take roots: tell "
+        "caster_gym.mechanics.scalars.register(kind, where, sqrt, anywhere) before they meet the equations"
+    )
 
 
 def where(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
     """`yes` where the condition holds, else `no`."""
-    choose = _WHERE.get(type(condition))
+    try:
+        choose = _WHERE[type(condition)]
+    except KeyError:
+        choose = _WHERE[type(condition)] = _functions_of(condition)[0]
     if choose is None:
         return yes if condition else no
     return choose(condition, yes, no)
@@ -43,14 +71,23 @@ def where(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
 
 def sqrt(x: Scalar) -> Scalar:
     """Square root of x >= 0."""
-    root = _SQRT.get(type(x))
+    try:
+        root = _SQRT[type(x)]
+    except KeyError:
+        root = _SQRT[type(x)] = _functions_of(x)[1]
     return math.sqrt(x) if root is None else root(x)
 
 
 def anywhere(condition: Scalar) -> bool:
     """Whether a condition holds for any robot of a batch; work that nobody needs can be left out."""
-    test = _ANYWHERE.get(type(condition))
+    try:
+        test = _ANYWHERE[type(condition)]
+    except KeyError:
+        test = _ANYWHERE[type(condition)] = _functions_of(condition)[2]
     return bool(condition if test is None else test(condition))
+
+
+register(np.ndarray, np.where, np.sqrt, np.any)
 
 
 def entry(table: Any, i: Any, j: Any) -> Any:

@@ -121,6 +121,13 @@ class PlantRuntime(Runtime, ABC):
     def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
         """Mechanics parameters (k, fields) of robots whose episodes with these seeds (k,) are about to start."""
 
+    def extremes(self, parameters: Array) -> Array:
+        """The hardest to follow by time steps (more, fields) of what `rebuild` makes of robots (k, fields).
+
+        A plant that does not tell is judged by a number of draws alone.
+        """
+        return parameters
+
 
 class PushingRuntime(Runtime, ABC):
     """A feature that pushes the robots from outside."""

@@ -78,20 +78,14 @@ class WheelErrors(Feature):
     radius: Range = 0.0  # [m] true radius minus described one
 
     def runtime(self, place: Place) -> Runtime:
-        """Casters of other sizes. Raises ValueError for ones that time steps cannot follow."""
-        robot, task = place.engine.robot, place.task
+        """Casters of other sizes. Raises ValueError for ones that do not exist."""
+        robot = place.engine.robot
         trail = min(caster.trail for caster in robot.casters) + limits(self.trail)[0]
         radius = min(caster.radius for caster in robot.casters) + limits(self.radius)[0]
         if trail <= 0.0 or radius <= 0.0:
             raise ValueError(
                 f"wheel_errors must leave trails and radii of robot {robot.name!r} positive, "
                 f"got a trail of {trail:g} m and a radius of {radius:g} m"
-            )
-        speed = max((caster.radius + limits(self.radius)[1]) * caster.roll.max_speed for caster in robot.casters)
-        if task.time_step > (longest := trail / speed) * (1.0 + 1e-9):
-            raise ValueError(
-                f"wheel_errors make a trail of {trail:g} m at a top speed of {speed:g} m/s, which needs a time step of "
-                f"at most {longest:.3g} s, got {task.time_step:g} s: use more substeps or smaller errors"
             )
         return _WheelErrors(self, place)
 
@@ -101,8 +95,18 @@ class _Payload(PlantRuntime):
         self._feature = feature
 
     def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
-        feature = self._feature
         shares = uniforms(seeds, np.arange(3))
+        return self._loaded(parameters, shares)
+
+    def extremes(self, parameters: Array) -> Array:
+        """The lightest load, at each corner: more mass makes everything slower."""
+        corners = np.array([(0.0, x, y) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)])
+        rows = np.repeat(parameters, len(corners), axis=0)
+        return self._loaded(rows, np.tile(corners, (len(parameters), 1)))
+
+    def _loaded(self, parameters: Array, shares: Array) -> Array:
+        """Robots with loads at shares (k, 3) of the ranges of mass, x and y."""
+        feature = self._feature
         added = between(feature.mass, shares[:, 0])
         x, y = between(feature.x, shares[:, 1]), between(feature.y, shares[:, 2])
         bare = PlatformParameters(*parameters[:, :PLATFORM_FIELDS].T)
@@ -132,6 +136,13 @@ class _Friction(PlantRuntime):
             rebuilt[:, _platform("floor_friction")] = between(self._floor, uniforms(seeds, np.zeros(1, np.int64))[:, 0])
         return rebuilt
 
+    def extremes(self, parameters: Array) -> Array:
+        """The greatest friction in every joint."""
+        rebuilt = parameters.copy()
+        for columns, scale, added in self._kinds:
+            rebuilt[:, columns] = limits(scale)[1] * parameters[:, columns] + limits(added)[1]
+        return rebuilt
+
 
 class _WheelErrors(PlantRuntime):
     """Encoders show joint rates, whatever the wheels' sizes: observations scale these with the described sizes."""
@@ -148,6 +159,13 @@ class _WheelErrors(PlantRuntime):
     def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
         rebuilt = parameters.copy()
         rebuilt[:, self._columns] += self._errors(seeds)
+        return rebuilt
+
+    def extremes(self, parameters: Array) -> Array:
+        """The ends of both ranges, in all casters alike."""
+        ends = [(r, d) for r in limits(self._feature.radius) for d in limits(self._feature.trail)]
+        rebuilt = np.repeat(parameters, len(ends), axis=0)
+        rebuilt[:, self._columns] += np.tile(ends, (len(parameters), len(self._columns) // 2))
         return rebuilt
 
     def begin(self, robots: NDArray[np.int64], quantities: Quantities) -> None:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from caster_gym.envs.task_engine import TaskEngine
 
 EVERYONE = slice(None)
+_TRIED = 32  # draws of the plants that are checked beforehand
 
 
 class Stack:
@@ -59,6 +60,8 @@ class Stack:
         if taken := set(names) & set(engine.plan.terms):
             raise ValueError(f"the task has a reward term {min(taken)!r} of its own: give yours another 'name'")
         self._nominal = np.array([pack_parameters(robot_parameters(engine.robot))])
+        if self._plants:
+            self._check_plants()
         engine.on_restart.append(self._on_restart)
 
     def _started(self, index: int, feature: Feature) -> Runtime:
@@ -66,6 +69,17 @@ class Stack:
         runtime = feature.runtime(Place(self._engine, self._task, width, self._seeds[index], self._clocks))
         self.action_space = runtime.action_space or self.action_space
         return runtime
+
+    def _check_plants(self) -> None:
+        """Refuse plants that the time step cannot follow: at the ends of their ranges, and some draws between."""
+        extremes = self._nominal
+        drawn = np.repeat(self._nominal, _TRIED, axis=0)
+        keys, episodes = np.arange(_TRIED, dtype=np.uint64), np.zeros(_TRIED, dtype=np.uint64)
+        for i, plant in self._plants:
+            extremes = plant.extremes(extremes)
+            drawn = plant.rebuild(drawn, seeds_of(keys, episodes, self._streams[i]))
+        what = f"robots like {self._engine.robot.name!r} as the environment's features may make them"
+        self._engine.check_parameters(np.concatenate([extremes, drawn]), what)
 
     def _on_restart(self, robots: NDArray[np.int64]) -> None:
         keys, episodes = self._engine.episodes(robots)
@@ -75,7 +89,9 @@ class Stack:
             rows = np.repeat(self._nominal, len(robots), axis=0)
             for i, plant in self._plants:
                 rows = plant.rebuild(rows, self._coming[i, robots])
-            self._engine.set_parameters(robots, rows)
+            self._engine.set_parameters(
+                robots, rows, checked=True
+            )  # at the start; here it would take longer than steps
 
     def begin(self, robots: NDArray[np.int64], observations: Observations, infos: Mapping[str, Any]) -> Observations:
         """What some robots show after their reset; observations are theirs, infos those of all robots."""
