@@ -13,11 +13,15 @@ term, with V linear during the step, makes that the fourth power (Blanes et al.,
     a = 1 + iα tanh(κ) / κ      b = δ tanh(κ) / κ
 """
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.paths.trajectory import Array, Plane
 from caster_gym.robot import Robot
+
+Pair: TypeAlias = tuple[Array, Array]
 
 _LEAST_WAY = 1e-12  # [m] a pivot that moves less in a step does not tell a direction
 _LEAST_KAPPA = 1e-12  # [-] below which tanh(κ) / κ is 1
@@ -59,6 +63,24 @@ def directions_at_rows(point: Plane, heading: Plane, robot: Robot) -> Plane:
     for j in range(len(a)):
         psi[j + 1] = _moved(psi[j], a[j], b[j])
     return np.moveaxis(psi, -1, 0)
+
+
+def steered(direction: Pair, way: Pair, change: Pair, trails: Array) -> Pair:
+    """Rolling directions after ways (..., N) of the pivots [m], all in one frame; V changes by `change` over the time.
+
+    In real numbers: rounding then does not depend on the place in an array, as that of NumPy's complex ones does.
+    """
+    (c, s), (x, y) = direction, way
+    d_x, d_y = x / (2.0 * trails), y / (2.0 * trails)
+    alpha = (x * change[1] - y * change[0]) / (24.0 * trails * trails)
+    kappa = np.sqrt(np.maximum(d_x * d_x + d_y * d_y - alpha * alpha, _LEAST_KAPPA**2))
+    pull = np.minimum(np.tanh(kappa), 1.0 - 1e-12) / kappa
+    b_x, b_y, turn = d_x * pull, d_y * pull, alpha * pull
+    p, q = c - turn * s + b_x, s + turn * c + b_y  # a psi + b
+    u, v = b_x * c + b_y * s + 1.0, b_x * s - b_y * c - turn  # b̄ psi + ā
+    cos, sin = p * u + q * v, q * u - p * v
+    size = np.sqrt(cos * cos + sin * sin)
+    return cos / size, sin / size
 
 
 def _maps(way: Plane, change: Plane, robot: Robot) -> tuple[Plane, Plane]:
