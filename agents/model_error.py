@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from caster_gym.analysis.frames import motion_in_body
 from caster_gym.engines.numpy_model import Model
-from caster_gym.paths.feasibility import trailing_directions
 from caster_gym.paths.specification import AnyPath
+from caster_gym.paths.trailing import trailing_directions
 from caster_gym.robot import Robot
 
 from .computed_torque import Gains, KnownModel, known_model

@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.driven_motion import inertial_force, lead, steady_steering, work
-from caster_gym.paths.feasibility import trailing_directions
 from caster_gym.paths.headings import Fixed, Spinning
 from caster_gym.paths.shapes import Circle, Ellipse
+from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import Trajectory
 from tests.kane import Kane
 from tests.random_robots import random_robot

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.paths import build_trajectories, read_paths
-from caster_gym.paths.feasibility import check_feasible, motor_use, trailing_directions
+from caster_gym.paths.feasibility import check_feasible, motor_use
+from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import COLUMNS, Trajectory
 from caster_gym.robot import Robot
 
@@ -38,46 +39,6 @@ def in_body(samples):
 def steering_along(samples, robot):
     directions = trailing_directions(samples[None], robot)[0]
     return np.angle(directions / (samples[:, 2] + 1j * samples[:, 3])[:, None])
-
-
-@pytest.mark.parametrize("path", ["lemniscate", {"shape": "circle", "heading": "spinning"}])
-def test_casters_trail_as_the_steering_rates_of_the_model_say(path):
-    """RK4 of δ̇ from the model on a table of 1 ms, its step 2 ms, against the map at 20 ms and at 10 ms.
-
-    RK4 errs by less than 1e-6 here; the map by the square of its step: 1e-3 rad at 20 ms and a quarter at 10 ms.
-    """
-    model = Model(ROBOT)
-    (exact,) = trajectories(path, 0.001)
-    twist, _ = in_body(exact.samples)
-    h, angle = 0.002, steering_along(exact.samples, ROBOT)[0]
-    history = [angle]
-    for k in range(0, len(twist) - 2, 2):
-        k1 = model.rates(angle, twist[k])[2]
-        k2 = model.rates(angle + 0.5 * h * k1, twist[k + 1])[2]
-        k3 = model.rates(angle + 0.5 * h * k2, twist[k + 1])[2]
-        k4 = model.rates(angle + h * k3, twist[k + 2])[2]
-        angle = angle + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        history.append(angle)
-    errors = []
-    for time_step in (0.02, 0.01):
-        (coarse,) = trajectories(path, time_step)
-        steering = steering_along(coarse.samples, ROBOT)
-        expected = np.array(history)[:: round(time_step / h)]
-        # The first motion is as small as t³, so that its direction at the very start is lost in rounding.
-        errors.append(abs(np.angle(np.exp(1j * (steering - expected))))[25:].max())
-    assert errors[0] < 4e-3
-    assert errors[0] / errors[1] > 3.0
-
-
-def test_casters_point_along_a_straight_line_from_the_start():
-    (line,) = trajectories({"shape": "spline", "waypoints": [(0, 0), (3, 4)], "heading": "fixed"})
-    assert_allclose(trailing_directions(line.samples[None], ROBOT), 0.6 + 0.8j, atol=1e-9)  # first way of 1e-6 m
-
-
-def test_pivots_that_never_move_keep_their_casters_ahead():
-    still = np.zeros((1, 11, len(COLUMNS)))
-    still[..., COLUMNS.index("cos")] = 1.0
-    assert_allclose(trailing_directions(still, ROBOT), 1.0, atol=0.0)
 
 
 @pytest.mark.parametrize("path", [*DEFAULTS[:4], {"shape": "random_paths", "count": 5}])

@@ -228,3 +228,57 @@ def test_an_agent_with_other_actions_is_refused():
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"the agent's actions must have shape \(2, 6\), got \(2, 3\)"):
         env.step(np.zeros((2, 6), np.float32))
+
+
+def track(env, actions, steps):
+    """Poses (steps, robots, 4) under actions that may depend on the heading, a unit complex number; last twists."""
+    info, poses = env.reset(seed=1)[1], []
+    for _ in range(steps):
+        heading = info["pose"][:, 2] + 1j * info["pose"][:, 3]
+        observations, *_, info = env.step(actions(heading).astype(np.float32))
+        poses.append(info["pose"])
+    return np.array(poses), shown_twist(env, observations)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("bandwidth", [2.0, 20.0, 1000.0])
+@pytest.mark.parametrize("frame", ["world", "body"])
+def test_a_turning_robot_goes_where_commands_point(robot, bandwidth, frame):
+    """A direction of the world, given as such or turned into B before every action, at 2 rad/s to either side.
+
+    Without feed-forward it went atan(2 (T/2 + 1/bandwidth)) beside it: 7 degrees at 20/s.
+    """
+    env = batch(TwistCommands(frame=frame, max_speed=1.0, max_yaw_rate=4.0, bandwidth=bandwidth), robot=robot, count=2)
+    wanted = 0.4 * np.exp([0.7j, -2.0j])
+
+    def actions(heading):
+        v = wanted if frame == "world" else wanted / heading
+        return np.stack([v.real, v.imag, [0.5, -0.5]], axis=1)
+
+    poses, _ = track(env, actions, 300)
+    way = poses[-1] - poses[150]
+    mean = (way[:, 0] + 1j * way[:, 1]) / (149 * PERIOD)
+    assert np.degrees(np.abs(np.angle(mean / wanted))).max() < 0.5
+    assert_allclose(np.abs(mean), 0.4, rtol=0.02)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_constant_commands_in_the_body_stay_there(robot):
+    """A circle, whose velocity in B is the command at every observation."""
+    env = batch(TwistCommands(max_yaw_rate=4.0), robot=robot, count=2)
+    given = np.array([[0.3, 0.2, 0.5], [-0.2, 0.4, -0.5]])
+    _, twists = track(env, lambda heading: given, 150)
+    assert_allclose(twists, given * [1.0, 1.0, 4.0], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("robot", "speed", "rate"), [("chung2008", 1.0, 4.0), ("tidybot2", 1.5, 6.0), ("xr4000", 2.0, 6.0)]
+)
+def test_a_twist_beyond_the_motors_is_reduced_as_one(robot, speed, rate):
+    """It settles at a multiple of the command, to a few percent: hardly any torque is left to correct errors."""
+    env = batch(TwistCommands(max_speed=speed, max_yaw_rate=rate), robot=robot, count=3)
+    given = np.array([[1.0, 0.3, 1.0], [0.2, 1.0, -1.0], [1.0, 1.0, 1.0]])
+    _, twists = track(env, lambda heading: given, 250)
+    multiples = twists / (given * [speed, speed, rate])
+    assert multiples.max() < 1.0
+    assert (np.ptp(multiples, axis=1) < 0.05 * multiples.mean(axis=1)).all()

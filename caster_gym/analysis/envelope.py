@@ -31,7 +31,8 @@ from caster_gym.mechanics.linear import dot
 from caster_gym.mechanics.motors import motor_speeds
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten
-from caster_gym.paths.feasibility import least_effort, trailing_directions
+from caster_gym.paths.feasibility import least_effort
+from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 

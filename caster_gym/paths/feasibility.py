@@ -3,7 +3,6 @@
 The robot rolls without slip, its casters trail, and its motors share the work with the least effort.
 
     psi      rolling direction of a caster in W, unit complex number         [-]
-    D        way of its pivot during one time step, in W                     [m]
     use      torque over what the motor has left at its speed, or speed over top speed: 1 is the limit
 """
 
@@ -22,13 +21,13 @@ from caster_gym.mechanics.linear import dot, solve
 from caster_gym.mechanics.motors import motor_ranges, motor_speeds
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, total
+from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import Array, Plane, Trajectory
 from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
 _BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
-_LEAST_WAY = 1e-12  # [m] a pivot that moves less in a time step does not tell a direction
 
 
 @dataclass(frozen=True)
@@ -50,32 +49,6 @@ class Easable(Protocol):
     def remedy(self) -> str: ...
     def eased(self, factor: float) -> Self: ...
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]: ...
-
-
-def trailing_directions(samples: Array, robot: Robot) -> Plane:
-    """Rolling directions (P, K + 1, N) in W, as unit complex numbers, along samples (P, K + 1, 10).
-
-    They start in the direction of each pivot's first motion. Over one time step the exact kinematics
-    psi′ = (V − V̄ psi²) / 2d, V the velocity of the pivot, is solved for a straight way D, at whatever speed: a Möbius
-    map of the unit circle, stable for every step. The error falls with the square of the turn of D in one step.
-    """
-    heading = samples[..., 2] + 1j * samples[..., 3]
-    pivots = np.array([complex(caster.x, caster.y) for caster in robot.casters])
-    trails = np.array([caster.trail for caster in robot.casters])
-    place = (samples[..., 0] + 1j * samples[..., 1])[..., None] + heading[..., None] * pivots
-    way = np.moveaxis(np.diff(place, axis=1), 1, 0)  # D (K, P, N)
-    length = np.abs(way)
-    moving = length > _LEAST_WAY
-    first = np.take_along_axis(way, moving.argmax(axis=0)[None], axis=0)[0]
-    start = np.where(moving.any(axis=0), first, heading[:, 0, None])
-    pull = np.minimum(np.tanh(0.5 * length / trails), 1.0 - 1e-12)  # short of 1, where the map would be singular
-    shift = way * (pull / np.maximum(length, _LEAST_WAY))
-    psi = np.empty((len(way) + 1, *start.shape), dtype=np.complex128)
-    psi[0] = start / np.abs(start)
-    for k, m in enumerate(shift):
-        turned = (psi[k] + m) / (1.0 + m.conj() * psi[k])
-        psi[k + 1] = turned / np.abs(turned)
-    return np.moveaxis(psi, 0, 1)
 
 
 def motor_use(trajectories: Sequence[Trajectory], robot: Robot) -> MotorUse:

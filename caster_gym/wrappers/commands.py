@@ -9,10 +9,9 @@ import numpy as np
 from gymnasium.spaces import Box
 from pydantic import Field, PositiveFloat, field_validator
 
-from caster_gym.control.torque_distribution import distribute
-from caster_gym.engines.numpy_model import Model
-from caster_gym.mechanics.motors import torque_range
 from caster_gym.wrappers.feature import Actions, Array, Feature, Observations, Place, Robots, Runtime
+from caster_gym.wrappers.inner_loop import InnerLoop
+from caster_gym.wrappers.twist_loop import TwistLoop
 
 
 class ResidualTorque(Feature):
@@ -39,20 +38,28 @@ class ResidualTorque(Feature):
 
 
 class TwistCommands(Feature):
-    """Actions are twists (vx, vy, ω) in B as shares of the greatest ones, which an inner loop tracks with torques.
+    """Actions are twists (vx, vy, ω) as shares of the greatest ones, which an inner loop tracks with torques.
 
-    The robot's model at hand, a wanted twist is approached as exp(−bandwidth · t) while no motor is at its limit.
+    frame "body": vx and vy are along the axes of B. A constant command stays as it is in B, while the robot turns; one
+    that turns in B from action to action by no more than the robot does against it is expected to go on so, up to a
+    direction of the world that is turned into B before every action. frame "world": vx and vy are along those of W,
+    which the loop turns into B at the heading of info["pose"].
+
+    With the robot's model at hand, what is left to a wanted twist falls as exp(−bandwidth · t) while no motor is at its
+    limit. A twist that the motors cannot hold is reduced as a whole, to the greatest multiple that they can hold; the
+    way towards it likewise.
     """
 
     kind: Literal["twist_commands"] = "twist_commands"
     redefines_actions: ClassVar[bool] = True
+    frame: Literal["body", "world"] = "body"  # of vx and vy
     max_speed: PositiveFloat = 1.0  # [m/s] along each axis
     max_yaw_rate: PositiveFloat = 2.0  # [rad/s]
     bandwidth: PositiveFloat = 20.0  # [1/s]
 
     def runtime(self, place: Place) -> Runtime:
         """The inner loop."""
-        return _TwistLoop(self, place)
+        return TwistLoop(self, place)
 
 
 class JointSpeeds(Feature):
@@ -91,51 +98,7 @@ class _Residual(Runtime):
         return observations
 
 
-class _InnerLoop(Runtime):
-    """What loops read of the observation, and the motors they drive."""
-
-    def __init__(self, place: Place, bandwidth: float) -> None:
-        robot = place.engine.robot
-        self._layout = place.engine.layout
-        self._model = Model(robot)
-        self._gain = -np.expm1(-bandwidth * place.period) / place.period  # [1/s]
-        self._driven = [robot.joints.index(joint) for joint in robot.driven]
-        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-        self._max_torque = np.array([motor.max_torque for motor in motors])[self._driven]
-        self._max_speed = np.array([motor.max_speed for motor in motors])[self._driven]
-        self._gears = np.array([caster.gear for caster in robot.casters])
-        self._steering = np.zeros((place.count, robot.caster_count))
-        self._twist = np.zeros((place.count, 3))
-        self._speeds = np.zeros((place.count, len(self._driven)))
-
-    def observe(self, observations: Observations, robots: Robots) -> Observations:
-        see = self._layout.physical
-        directions = see(observations, "directions")
-        self._steering[robots] = np.arctan2(directions[:, 1::2].copy(), directions[:, ::2].copy())
-        self._twist[robots] = see(observations, "twist")
-        rates = see(observations, "joint_rates").reshape(len(observations), -1, 1, 2)
-        speeds = self._gears[:, :, 0] * rates[..., 0] + self._gears[:, :, 1] * rates[..., 1]
-        self._speeds[robots] = speeds.reshape(len(observations), -1)[:, self._driven]
-        return observations
-
-
-class _TwistLoop(_InnerLoop):
-    def __init__(self, feature: TwistCommands, place: Place) -> None:
-        super().__init__(place, feature.bandwidth)
-        self._greatest = np.array([feature.max_speed, feature.max_speed, feature.max_yaw_rate])
-        self.action_space = Box(-1.0, 1.0, (3,), np.float32)
-
-    def act(self, actions: Actions) -> Actions:
-        wanted = np.clip(actions.astype(np.float64), -1.0, 1.0) * self._greatest
-        force = self._model.inverse_dynamics(self._steering, self._twist, self._gain * (wanted - self._twist))
-        wrenches = self._model.motor_wrenches(self._steering)
-        low, high = torque_range(self._speeds, np.ones_like(self._speeds), self._max_speed)
-        wrenches[:, 2] /= self._model.characteristic_length
-        force[:, 2] /= self._model.characteristic_length
-        return distribute(wrenches, force, low, high).astype(np.float32)
-
-
-class _SpeedLoops(_InnerLoop):
+class _SpeedLoops(InnerLoop):
     def __init__(self, feature: JointSpeeds, place: Place) -> None:
         super().__init__(place, feature.bandwidth)
         self.action_space = Box(-1.0, 1.0, (len(self._driven),), np.float32)
