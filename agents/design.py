@@ -12,6 +12,7 @@ from caster_gym.analysis.design import Design, DesignTarget, check_designable, o
 from caster_gym.analysis.sizing import MotorRequirement, Requirement, require
 from caster_gym.analysis.target import driven_as
 from caster_gym.configuration import parse, read_yaml
+from caster_gym.file_names import NameOrFile, from_working_folder
 from caster_gym.robot import Robot, load_robot
 
 from .design_figures import write_design_figure
@@ -54,7 +55,7 @@ MEANINGS = {
 class DesignSettings(DesignTarget):
     """A target, and the robot that is to meet it."""
 
-    robot: str = "chung2008"  # name, or path of a YAML file
+    robot: NameOrFile = "chung2008"  # name, or path of a YAML file
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,8 @@ def read_design(target: str, robot: str | None = None, changes: Mapping[str, Any
     Raises ValueError for settings that are wrong by themselves, and for those with which the robot cannot be designed.
     """
     path = find("designs", target)
-    content = {**read_yaml(path), **(changes or {}), **({} if robot is None else {"robot": robot})}
-    settings = parse(DesignSettings, content, str(path))
+    given = {**(changes or {}), **({} if robot is None else {"robot": robot})}
+    settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, str(path), path.parent)
     check_designable(load_robot(settings.robot), settings)
     return settings
 

@@ -21,6 +21,7 @@ from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yam
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.file_names import NameOrFile, beside_its_file
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
@@ -66,7 +67,7 @@ class ChosenTask(Frozen):
 class TaskSettings(ChosenTask):
     """A robot, its task, and the paths to train, to choose and to test on."""
 
-    robot: str = "chung2008"  # name, or path of a YAML file
+    robot: NameOrFile = "chung2008"  # name, or path of a YAML file
     actuation: Literal["all"] | tuple[str, ...] | None = None  # None: as the robot file says
     arena: Arena = Arena()  # or the name of a YAML file
     wrappers: tuple[FeatureSpecification, ...] = ()  # features in training and in evaluation alike
@@ -77,8 +78,10 @@ class TaskSettings(ChosenTask):
 
     @field_validator("arena", mode="before")
     @classmethod
-    def _arena_may_be_a_file(cls, arena: Any) -> Any:
-        return read_arena(arena) if arena is None or isinstance(arena, str | Path) else arena
+    def _arena_may_be_a_file(cls, arena: Any, info: ValidationInfo) -> Any:
+        if isinstance(arena, str | Path):
+            return read_arena(beside_its_file(arena, info))
+        return read_arena(arena) if arena is None else arena
 
     @field_validator("wrappers", "shaping", mode="before")
     @classmethod
@@ -223,8 +226,8 @@ AgentSettings: TypeAlias = LearnedSettings | ComputedTorqueSettings
 class BenchmarkSettings(Frozen):
     """Which agents are compared, and how."""
 
-    task: str = "track"  # name of a file in configs/tasks, or path of one
-    agents: Annotated[tuple[str, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
+    task: NameOrFile = "track"  # name of a file in configs/tasks, or path of one
+    agents: Annotated[tuple[NameOrFile, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
     starts: PositiveInt = 1  # episodes on each test path, with different starts
     start_seed: Seed = 1000  # the same starts for every agent
@@ -258,7 +261,7 @@ def find(kind: str, name: str) -> Path:
 def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
     """Checked settings from a file that `find` finds."""
     path = find(kind, name)
-    return parse(model, read_yaml(path), str(path))
+    return parse(model, read_yaml(path), str(path), path.parent)
 
 
 def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> AgentSettings:
@@ -275,4 +278,4 @@ def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> AgentSett
     algorithm = content.get("algorithm")
     if algorithm not in kinds:
         raise ConfigurationError(f"{path}: {unknown_name('algorithm', algorithm, kinds)}")
-    return parse(kinds[algorithm], content, str(path))
+    return parse(kinds[algorithm], content, str(path), path.parent)

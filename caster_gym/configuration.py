@@ -15,6 +15,8 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from caster_gym.file_names import FOLDER
+
 LONGEST_VALUE = 80  # characters of a value in a message
 
 
@@ -94,10 +96,13 @@ def parse_yaml(text: str, source: str) -> Any:
         raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 
 
-def parse(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
-    """A checked model; errors become sentences that name the source, the key and the value."""
+def parse(model: type[Model], content: Mapping[str, Any], source: str, folder: Path | None = None) -> Model:
+    """A checked model; errors become sentences that name the source, the key and the value.
+
+    folder: of the file that the content was read from; relative names of files in the content start there.
+    """
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context={FOLDER: folder})
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {describe(error, model)}") from error
 
