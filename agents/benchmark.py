@@ -2,7 +2,6 @@
 
 import csv
 import multiprocessing
-import os
 import queue
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -32,6 +31,7 @@ from .settings import (
     read_settings,
 )
 from .summary import Result, table, write_episodes, write_summary
+from .threads import DEFAULT, limited_to, usable_cores
 from .track_metrics import TrackVerdict
 from .training import train
 from .training_run import Validation, verdict_on
@@ -75,10 +75,11 @@ def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | No
     return Comparison(settings, read_settings(TaskSettings, "tasks", settings.task), agents)
 
 
-def run_benchmark(comparison: Comparison, folder: Path) -> str:
+def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) -> str:
     """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
 
-    The folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
+    threads: of each training run, of which there are as many at a time as the cores allow, and of the evaluation. The
+    folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
     """
     settings, task, agents = comparison
     jobs = [
@@ -93,10 +94,11 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
     test.reset(seed=settings.start_seed)
     test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
 
-    model_based = {
-        name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ComputedTorqueSettings)
-    }
-    train_all(jobs)
+    with limited_to(threads):
+        model_based = {
+            name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ComputedTorqueSettings)
+        }
+    train_all(jobs, threads)
     contenders: list[Contender] = []
     for name, agent in agents.items():
         if name in model_based:
@@ -105,7 +107,8 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
             learned = load_bundle(job.folder / "best").agent
             alone = sum(other.algorithm == job.agent.algorithm for other in agents.values()) == 1
             contenders.append(Contender(learned.name if alone else name, learned, job.seed))
-    results, episodes = compare(contenders, test, settings)
+    with limited_to(threads):
+        results, episodes = compare(contenders, test, settings)
 
     text = table(results, settings.confidence)
     write_episodes(folder / "episodes.csv", results)
@@ -116,6 +119,7 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
     write_provenance(
         folder,
         benchmark=settings.model_dump(mode="json"),
+        threads=threads,
         task=task.model_dump(mode="json"),
         agents={name: agent.model_dump(mode="json") for name, agent in agents.items()},
         natural_frequencies={name: frequency for name, (_, frequency) in model_based.items()},
@@ -169,20 +173,19 @@ def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
     return tune(known, test_batch(settings, settings.validation, starts=1))[0]
 
 
-def train_all(jobs: Sequence[Job]) -> None:
-    """Train all jobs, one per core at a time, with one progress bar over all their steps.
+def train_all(jobs: Sequence[Job], threads: int = DEFAULT) -> None:
+    """Train all jobs, as many at a time as there are cores for their threads, with one progress bar over all steps.
 
     Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised.
     """
     if not jobs:
         return
-    cores = os.cpu_count() or 1
-    workers = min(len(jobs), cores)
+    workers = max(1, min(len(jobs), usable_cores() // threads))
     context = multiprocessing.get_context("spawn")
     with context.Manager() as manager, _bar(jobs) as show:
         reports = manager.Queue()
         with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            futures = [pool.submit(_train_job, i, job, cores // workers, reports) for i, job in enumerate(jobs)]
+            futures = [pool.submit(_train_job, i, job, threads, reports) for i, job in enumerate(jobs)]
             try:
                 while not all(future.done() for future in futures):
                     _raise_errors(futures)

@@ -2,11 +2,11 @@
 
 import csv
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import KVWriter, configure
 
 from .actor import Actor
 from .bundle import Bundle, PolicyDescription, save_bundle
@@ -17,6 +17,7 @@ from .provenance import versions
 from .settings import LearnedSettings, TaskSettings
 
 VALIDATION_SEED = 500
+STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
 Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
 
 
@@ -43,7 +44,7 @@ def verdict_on(agent: Agent, validation: Batch) -> Verdict:
 class Run:
     """The folder of a training run: validates policies, keeps them all and the best one, and tells how far it is.
 
-    steps: done so far. logger: for what else there is to record; it writes progress.csv and TensorBoard events.
+    steps: done so far. logger: what SB3 records by; it writes progress.csv and TensorBoard events.
     """
 
     def __init__(self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, report: Report) -> None:
@@ -80,14 +81,24 @@ class Run:
             self.steps, begun - self._started - self._validating, verdict_on(bundle.agent, self.validation)
         )
         self.history.append(result)
-        for name, value in result.numbers.items():
-            self.logger.record(f"validation/{name}", value)
+        self.record(self.steps, {f"validation/{name}": value for name, value in result.numbers.items()})
         save_bundle(self.folder / "checkpoints" / f"{self.steps:010d}", bundle)
         if self.best is None or result.verdict.merit > self.best.verdict.merit:
             self.best = result
             save_bundle(self.folder / "best", bundle)
         self._write_history()
         self._validating += time.perf_counter() - begun
+
+    def record(self, steps: int, numbers: Mapping[str, float]) -> None:
+        """Write numbers to progress.csv and TensorBoard at once, at their own step.
+
+        SB3 dumps what its logger was told when its next round ends: at a later step, and never after the last one.
+        """
+        values = {STEPS: steps, **numbers}
+        excluded: dict[str, tuple[str, ...]] = {name: ("tensorboard",) if name == STEPS else () for name in values}
+        for writer in self.logger.output_formats:
+            assert isinstance(writer, KVWriter)
+            writer.write(values, excluded, steps)
 
     def _describe(self, actor: Actor) -> PolicyDescription:
         return PolicyDescription(
