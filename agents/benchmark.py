@@ -13,7 +13,8 @@ from tqdm import tqdm
 
 from caster_gym.configuration import ConfigurationError
 
-from .bundle import load_bundle
+from .agent_settings import AgentSettings, ComputedTorqueSettings, LearnedSettings, read_agent
+from .bundle import DESCRIPTION, load_bundle
 from .computed_torque import ComputedTorque
 from .evaluation import Batch, Episodes, bare, roll_out, test_batch
 from .figures import write_figures
@@ -21,15 +22,7 @@ from .follow_metrics import FollowVerdict
 from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
-from .settings import (
-    AgentSettings,
-    BenchmarkSettings,
-    ComputedTorqueSettings,
-    LearnedSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from .settings import BenchmarkSettings, TaskSettings, is_yaml, names_of, read_settings
 from .summary import Result, table, write_episodes, write_summary
 from .threads import DEFAULT, limited_to, usable_cores
 from .track_metrics import TrackVerdict
@@ -163,14 +156,25 @@ def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
 
     Raises ValueError for a policy that does not fit the batch, and for an agent that must be trained first.
     """
-    if Path(name).is_dir():
-        bundle, plain = load_bundle(Path(name)), bare(batch)
-        bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
-        return bundle.agent
-    known = read_agent(name)
-    if not isinstance(known, ComputedTorqueSettings):
-        raise ValueError(f"agent {name!r} must be trained first: give the folder of its policy")
-    return tune(known, test_batch(settings, settings.validation, starts=1))[0]
+    folder = Path(name).expanduser()
+    named = name in names_of("agents") or (is_yaml(name) and folder.name != DESCRIPTION)
+    known = read_agent(name) if named else None
+    if isinstance(known, ComputedTorqueSettings) and not (folder / DESCRIPTION).is_file():
+        return tune(known, test_batch(settings, settings.validation, starts=1))[0]
+    if known is None and not folder.exists() and len(folder.parts) == 1:
+        model_based = [one for one in names_of("agents") if isinstance(read_agent(one), ComputedTorqueSettings)]
+        raise ValueError(
+            f"there is neither a folder of a policy nor a model-based agent called {name!r}; such are "
+            f"{', '.join(model_based)}"
+        )
+    if known is not None and not folder.is_dir():
+        raise ValueError(
+            f"agent {name!r} must be trained first: `caster-gym train {name} --out RUN` writes its policy to RUN/best, "
+            "which is the folder to give"
+        )
+    bundle, plain = load_bundle(folder), bare(batch)
+    bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
+    return bundle.agent
 
 
 def train_all(jobs: Sequence[Job], threads: int = DEFAULT) -> None:

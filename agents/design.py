@@ -76,7 +76,8 @@ def read_design(target: str, robot: str | None = None, changes: Mapping[str, Any
     """
     path = find("designs", target)
     given = {**(changes or {}), **({} if robot is None else {"robot": robot})}
-    settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, str(path), path.parent)
+    source = f"{path}, as changed" if given else str(path)
+    settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, source, path.parent)
     check_designable(load_robot(settings.robot), settings)
     return settings
 

@@ -12,7 +12,7 @@ from torch import Tensor
 from caster_gym.envs.torch_vector_env import TorchVectorEnv
 
 from .actor import Actor
-from .settings import RslPPOSettings
+from .agent_settings import RslPPOSettings
 from .tensors import torch_fields
 from .training_run import Run
 

@@ -18,7 +18,8 @@ from caster_gym import load_robot
 from caster_gym.envs.torch_task import TaskOutcome, TorchTask
 
 from .actor import Actor
-from .settings import SHACSettings, TaskSettings
+from .agent_settings import SHACSettings
+from .settings import TaskSettings
 from .tensors import check_compiler, torch_fields
 from .training_run import Run
 

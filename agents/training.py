@@ -7,9 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from .agent_settings import LearnedSettings, RslPPOSettings, SHACSettings
 from .provenance import write_provenance
 from .sb3_learning import learn_with_sb3
-from .settings import LearnedSettings, RslPPOSettings, SHACSettings, TaskSettings
+from .settings import TaskSettings
 from .threads import DEFAULT, limited_to
 from .training_run import Report, Run, Validation
 

@@ -4,17 +4,18 @@ import csv
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from stable_baselines3.common.logger import KVWriter, configure
 
 from .actor import Actor
+from .agent_settings import LearnedSettings
 from .bundle import Bundle, PolicyDescription, save_bundle
 from .evaluation import Batch, bare, roll_out, test_batch
 from .metrics import Verdict, in_words, yardstick
 from .protocol import Agent
 from .provenance import versions
-from .settings import LearnedSettings, TaskSettings
+from .settings import TaskSettings
 
 VALIDATION_SEED = 500
 STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
@@ -55,6 +56,7 @@ class Run:
         self.history: list[Validation] = []
         self.best: Validation | None = None
         self.steps = 0
+        self._diverged = False
         self._validating = 0.0
         self._started = time.perf_counter()
         self._due = settings.steps / settings.validations
@@ -68,13 +70,23 @@ class Run:
         self.report(steps, in_words(self.history[-1].verdict) if self.history else "")
 
     def finish(self, steps: int, actor: Callable[[], Actor]) -> None:
-        """Validate what has been learned since the last time."""
+        """Validate what has been learned since the last time, unless that has diverged."""
         self.steps = steps
-        if not self.history or self.history[-1].steps < steps:
+        if not self._diverged and (not self.history or self.history[-1].steps < steps):
             self.validate(actor())
+
+    def diverged(self, steps: int, cause: BaseException | None = None) -> NoReturn:
+        """End the run, whose policy is no longer one; what was validated before is kept."""
+        self._diverged = True
+        rate = self.settings.learning_rate
+        raise ValueError(
+            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}: set a smaller one"
+        ) from cause
 
     def validate(self, actor: Actor) -> None:
         """Try a policy on the validation paths, keep it, and keep it as the best one if it is."""
+        if not all(bool(weights.isfinite().all()) for weights in actor.state_dict().values()):
+            self.diverged(self.steps)
         begun = time.perf_counter()
         bundle = Bundle(self._describe(actor), actor)
         result = Validation(

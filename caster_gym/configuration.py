@@ -8,8 +8,8 @@ import re
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
@@ -24,6 +24,9 @@ class Frozen(BaseModel):
     """Parameters that are checked once and never change. Words and yes/no are not taken for numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    # What others call a field, or what is not set here: the field's name here, or where to set it, in words
+    usual_names: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     @model_validator(mode="wrap")
     @classmethod
@@ -80,7 +83,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise ConfigurationError(f"{path} cannot be read as YAML: {error}") from error
     content = parse_yaml(text, str(path))
     if not isinstance(content, dict):
-        raise ConfigurationError(f"{path} must hold a mapping of keys to values, got {type(content).__name__}")
+        kind = {"NoneType": "nothing", "list": "a list", "str": "words"}.get(type(content).__name__, repr(content))
+        raise ConfigurationError(f"{path} must hold a mapping of keys to values, got {kind}")
     return content
 
 
@@ -132,6 +136,14 @@ def did_you_mean(name: object, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
+def _advice(key: str, models: Iterable[type[BaseModel]]) -> str:
+    """What to write instead of a key that none of the models has."""
+    for model in models:
+        if here := getattr(model, "usual_names", {}).get(key):
+            return f"it is called {here!r} here" if here in model.model_fields else here
+    return did_you_mean(key, {name for model in models for name in model.model_fields})
+
+
 def _misread(given: Any, read: Any) -> Iterator[tuple[tuple[int | str, ...], Any, str]]:
     """Where something else was made a number or a truth value of, what it was, and what it should have been."""
     if isinstance(given, Mapping) and isinstance(read, Mapping):
@@ -152,8 +164,8 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
     kind, location, details = problem["type"], problem["loc"], problem.get("ctx", {})
     if kind == "extra_forbidden":
         place, key = _place(model, location[:-1]), str(location[-1])
-        known = {name for one in place.members if _is_model(one) for name in one.model_fields}
-        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {did_you_mean(key, known)}", ""
+        models = [one for one in place.members if _is_model(one)]
+        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {_advice(key, models)}", ""
     where = str(_place(model, location))
     if kind == "missing":
         return where, " is missing", ""
@@ -165,7 +177,8 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         return where, f": {details['discriminator']} is missing", ""
     if kind in ("too_short", "too_long") and "actual_length" in details:
         bound = f"at least {details['min_length']}" if kind == "too_short" else f"at most {details['max_length']}"
-        return where, f" should have {bound} items, got {details['actual_length']}", ""
+        items = "item" if bound.endswith(" 1") else "items"
+        return where, f" should have {bound} {items}, got {details['actual_length']}", ""
     message = _PLAIN.get(kind, re.sub(r"^(Value error, |\w+ (?=should))", "", problem["msg"]))
     complete = not location or "got " in message or isinstance(details.get("error"), ConfigurationError)
     joint = " " if message.startswith(("should", "must", "needs")) else ": "
@@ -175,6 +188,7 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
 _PLAIN = {  # for what pydantic says in terms of Python
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "should be a mapping of keys to values"),
     **dict.fromkeys(("tuple_type", "list_type"), "should be a list"),
+    "string_type": "should be text",
     **dict.fromkeys(("float_type", "float_parsing"), "should be a number"),
     **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "should be a whole number"),
 }

@@ -26,22 +26,21 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from tqdm import tqdm
 
 from caster_gym.agents.actor import Actor
+from caster_gym.agents.agent_settings import (
+    ComputedTorqueSettings,
+    LearnedSettings,
+    PPOSettings,
+    RslPPOSettings,
+    SHACSettings,
+    read_agent,
+)
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
 from caster_gym.agents.metrics import yardstick
 from caster_gym.agents.protocol import Agent
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
-from caster_gym.agents.settings import (
-    ComputedTorqueSettings,
-    LearnedSettings,
-    PPOSettings,
-    RslPPOSettings,
-    SHACSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from caster_gym.agents.settings import TaskSettings, read_settings
 from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_task
 from caster_gym.agents.training_run import Run
 from caster_gym.engines.threads import set_threads

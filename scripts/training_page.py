@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from caster_gym.agents.agent_settings import LearnedSettings
 from caster_gym.agents.metrics import Verdict
 from caster_gym.agents.provenance import versions
-from caster_gym.agents.settings import LearnedSettings
 from caster_gym.papers.drawing import COLOURS, new_figure
 from scripts.mujoco_peer import paragraph
 from scripts.speed_page import processor, table

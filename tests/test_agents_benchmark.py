@@ -8,6 +8,7 @@ import pytest
 import yaml
 from numpy.testing import assert_array_equal
 
+from caster_gym.agents.agent_settings import ComputedTorqueSettings, read_agent
 from caster_gym.agents.benchmark import (
     Contender,
     Job,
@@ -22,13 +23,7 @@ from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.computed_torque import ComputedTorque
 from caster_gym.agents.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.follow_metrics import FollowMetrics, FollowVerdict
-from caster_gym.agents.settings import (
-    BenchmarkSettings,
-    ComputedTorqueSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, read_settings
 from caster_gym.agents.track_metrics import TrackMetrics, TrackVerdict, measure
 from caster_gym.agents.training_run import VALIDATION_SEED
 from caster_gym.configuration import ConfigurationError

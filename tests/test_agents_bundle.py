@@ -11,11 +11,11 @@ from safetensors.torch import load_file, save_file
 
 from caster_gym.agents import bundle as module
 from caster_gym.agents.actor import Actor
+from caster_gym.agents.agent_settings import PPOSettings, SACSettings
 from caster_gym.agents.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_bundle, save_bundle
 from caster_gym.agents.evaluation import roll_out
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.sb3_learning import actor_of, make_learner
-from caster_gym.agents.settings import PPOSettings, SACSettings
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.follow_task import FollowTask
@@ -171,7 +171,7 @@ def test_python_tags_in_the_description_are_refused_and_run_nothing(tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"there is no file '.*nowhere.policy\.yaml'"):
+    with pytest.raises(ConfigurationError, match=r"there is no folder '.*nowhere' of a policy"):
         load_bundle(tmp_path / "nowhere")
     folder = saved(tmp_path)
     (folder / WEIGHTS).unlink()

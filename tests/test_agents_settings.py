@@ -7,19 +7,16 @@ import pytest
 import yaml
 from gymnasium.vector import AutoresetMode
 
-from caster_gym.agents.evaluation import bare, make_batch
-from caster_gym.agents.settings import (
+from caster_gym.agents.agent_settings import (
     AgentSettings,
-    BenchmarkSettings,
     ComputedTorqueSettings,
     LearnedSettings,
     PPOSettings,
     SACSettings,
-    TaskSettings,
-    find,
     read_agent,
-    read_settings,
 )
+from caster_gym.agents.evaluation import bare, make_batch
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, find, read_settings
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
@@ -109,14 +106,15 @@ def test_what_is_wrong_with_an_agent_is_named(tmp_path, content, message):
 
 def test_a_batch_must_fit_into_what_is_collected():
     PPOSettings(algorithm="ppo", robots=4, horizon=8, batch=32)
-    with pytest.raises(ConfigurationError, match=r"batch of 33 needs at most robots · horizon = 32 steps"):
+    with pytest.raises(ConfigurationError, match="'batch' must be at most robots · horizon = 32 steps, got 33"):
         parse(PPOSettings, {"algorithm": "ppo", "robots": 4, "horizon": 8, "batch": 33}, "ppo")
 
 
 @pytest.mark.parametrize(("kind", "other"), [("test", "train"), ("validation", "train"), ("test", "validation")])
 def test_held_out_paths_are_held_out(kind, other):
     shared = {"shape": "random_paths", "seed": 9, "count": 3}
-    with pytest.raises(ConfigurationError, match=f"a {kind} path must not be among the {other}.* seed=9"):
+    where = f"{{shape: random_paths, seed: 9}} as {kind} path 2 and as {other}(ing)? path 2; give one"
+    with pytest.raises(ConfigurationError, match=f"a {kind} path must not be among the {other}.*, got {where}"):
         parse(TaskSettings, {**PATHS, kind: [*PATHS[kind], shared], other: [*PATHS[other], shared]}, "task")
     parse(TaskSettings, {**PATHS, kind: [*PATHS[kind], shared]}, "task")
 

@@ -10,17 +10,10 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import caster_gym
 from caster_gym.agents import evaluation
+from caster_gym.agents.agent_settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings, read_agent
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.evaluation import roll_out
-from caster_gym.agents.settings import (
-    PPOSettings,
-    RslPPOSettings,
-    SACSettings,
-    SHACSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from caster_gym.agents.settings import TaskSettings, read_settings
 from caster_gym.agents.threads import DEFAULT
 from caster_gym.agents.track_metrics import TrackVerdict, measure
 from caster_gym.agents.training import train
