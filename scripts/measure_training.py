@@ -2,8 +2,9 @@
 
 First, what simulation costs PPO: control periods per second of training on our robots and on robots that cost nothing,
 which answer with arrays of the same shapes drawn beforehand; turn by turn, so that a busy moment hits both. Then, how
-long each learner takes until its policy follows validation paths as well as asked, all in the same run. The command
-writes a page, and a figure and a table in a folder beside it.
+long each learner takes until its policy follows validation paths as well as asked; and what a second thread does
+beside other busy processes, all in the same run. The command writes a page, and a figure and a table in a folder beside
+it.
 """
 
 import argparse
@@ -45,6 +46,7 @@ from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_t
 from caster_gym.agents.training_run import Run
 from caster_gym.engines.threads import set_threads
 from scripts.speed_timing import RATE, Row, middle, run
+from scripts.training_busy import Beside, train_beside
 from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page
 
 BANK = 64  # steps drawn beforehand
@@ -163,6 +165,12 @@ def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
         Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))
         for key, environment in ((OURS, ours), (FREE, free))
     ]
+
+
+def beside_others(task: TaskSettings, settings: PPOSettings) -> Beside:
+    """PPO on our robots with one thread and with two, beside busy processes."""
+    environment = CasterVecEnv(training_batch(task, settings.robots))
+    return train_beside(make_learner(settings, environment, seed=0), settings.robots * settings.horizon)
 
 
 def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
@@ -291,10 +299,11 @@ def main(arguments: list[str] | None = None) -> None:
         costs = {name: window_costs(task, one) for name, one in agents.items() if isinstance(one, SHACSettings)}
         courses = [train_timed(name, task, one, seed) for seed in chosen.seeds for name, one in agents.items()]
         rates = {name: (one, rate_on_tensors(task, one)) for name, one in on_tensors.items()}
+        beside = beside_others(task, ppo)
     given = sys.argv[1:] if arguments is None else arguments
     command = shlex.join(["python", "-m", "scripts.measure_training", *given])
     occasion = Occasion(command, chosen.turns, chosen.goal, (load, os.getloadavg()[0]))
-    write_page(chosen.out, Results(agents, measured, courses, costs, rates), occasion)
+    write_page(chosen.out, Results(agents, measured, courses, costs, rates, beside), occasion)
     print(chosen.out)
 
 
