@@ -1,6 +1,7 @@
 """Typed settings of agents; the YAML files in configs/agents hold what differs from the defaults."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
@@ -142,7 +143,7 @@ LearnedSettings: TypeAlias = PPOSettings | SACSettings | RslPPOSettings | SHACSe
 AgentSettings: TypeAlias = LearnedSettings | ComputedTorqueSettings
 
 
-def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> AgentSettings:
+def read_agent(name: str | Path, changes: Mapping[str, Any] | None = None) -> AgentSettings:
     """Checked settings of an agent, with some fields changed."""
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}

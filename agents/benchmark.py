@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
-from caster_gym.configuration import ConfigurationError
+from caster_gym.configuration import ConfigurationError, is_yaml
 
 from .agent_settings import AgentSettings, ComputedTorqueSettings, LearnedSettings, read_agent
 from .bundle import DESCRIPTION, load_bundle
@@ -22,7 +22,7 @@ from .follow_metrics import FollowVerdict
 from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
-from .settings import BenchmarkSettings, TaskSettings, is_yaml, names_of, read_settings
+from .settings import BenchmarkSettings, TaskSettings, names_of, read_settings
 from .summary import Result, table, write_episodes, write_summary
 from .threads import DEFAULT, limited_to, usable_cores
 from .track_metrics import TrackVerdict

@@ -16,11 +16,11 @@ from pydantic import (
 )
 
 from caster_gym.arena.arena import Arena, read_arena
-from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
-from caster_gym.file_names import NameOrFile, beside_its_file
+from caster_gym.file_names import NameOrFile, beside_its_file, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
@@ -77,6 +77,8 @@ class TaskSettings(ChosenTask):
     train: Paths
     validation: Paths
     test: Paths
+
+    _files_beside = field_validator("train", "validation", "test", mode="before")(with_files_beside)
 
     @field_validator("arena", mode="before")
     @classmethod
@@ -151,11 +153,6 @@ class BenchmarkSettings(Frozen):
 Settings = TypeVar("Settings", bound=BaseModel)
 
 
-def is_yaml(name: str) -> bool:
-    """Is this the path of a YAML file, and not a name?"""
-    return Path(name).suffix.lower() in (".yaml", ".yml")
-
-
 def names_of(kind: str) -> list[str]:
     """Names of the tasks, agents, designs or benchmarks that come with the package."""
     return sorted(file.stem for file in _folder_of(kind).glob("*.yaml"))
@@ -165,13 +162,16 @@ def _folder_of(kind: str) -> Path:
     return Path(str(files("caster_gym.configs"))) / kind
 
 
-def find(kind: str, name: str) -> Path:
+def find(kind: str, name: str | Path) -> Path:
     """The file of a task, agent, design or benchmark: one that comes with the package, by its name, or a path."""
     if is_yaml(name):
         path = Path(name).expanduser()
         if not path.exists() and path.stem in names_of(kind):
-            raise ConfigurationError(f"there is no file {name!r}; what comes with the package is called {path.stem!r}")
+            raise ConfigurationError(
+                f"there is no file {str(name)!r}; what comes with the package is called {path.stem!r}"
+            )
         return path
+    name = str(name)
     if name not in names_of(kind):
         own = next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
         known = f"known are {', '.join(names_of(kind))}, or give the path of a YAML file"
@@ -181,7 +181,7 @@ def find(kind: str, name: str) -> Path:
     return _folder_of(kind) / f"{name}.yaml"
 
 
-def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
+def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:
     """Checked settings from a file that `find` finds."""
     path = find(kind, name)
     return parse(model, read_yaml(path), str(path), path.parent)

@@ -26,6 +26,18 @@ def is_file_name(name: str) -> bool:
     return Path(name).suffix[1:2].isalpha()
 
 
+def with_files_beside(items: Any, info: ValidationInfo) -> Any:
+    """A list of mappings whose 'file', where they have one, starts from the folder of the file that holds the list."""
+    if not isinstance(items, list | tuple):
+        return items
+    return [
+        {**one, "file": str(beside_its_file(one["file"], info))}
+        if isinstance(one, Mapping) and isinstance(one.get("file"), str | Path)
+        else one
+        for one in items
+    ]
+
+
 def from_working_folder(value: Any) -> Any:
     """A value of the command line that is to stand in a file's content: its names of files start where they did."""
     if isinstance(value, Mapping):

@@ -34,11 +34,15 @@ def project(tmp_path, monkeypatch):
         "arena.yaml": {"pillars": [{"centre": [30.0, 0.0]}]},
         "task.yaml": {"robot": "robots/mine.yaml", "arena": "arena.yaml", **PATHS},
         "comparison.yaml": {"task": "task.yaml", "agents": ["computed_torque", "learner.yaml"]},
+        "points.yaml": {**PATHS, "test": [{"shape": "spline", "file": "paths/points.csv"}]},
         "target.yaml": {
             **yaml.safe_load((CONFIGS / "designs" / "indoor.yaml").read_text(encoding="utf-8")),
             "robot": "robots/mine.yaml",
+            "paths": [{"shape": "spline", "file": "paths/points.csv", "duration": 20.0}],
         },
     }
+    (folder / "paths").mkdir()
+    (folder / "paths" / "points.csv").write_text("x,y\n0,0\n1,0\n1,1\n", encoding="utf-8")
     for name, content in contents.items():
         (folder / name).write_text(yaml.safe_dump(content), encoding="utf-8")
     monkeypatch.chdir(elsewhere)
@@ -54,7 +58,10 @@ def test_files_that_name_one_another_are_found_from_anywhere(project, relative):
     comparison = read_comparison(read_settings(BenchmarkSettings, "benchmarks", str(start / "comparison.yaml")))
     assert comparison.task == task
     assert list(comparison.agents) == ["computed_torque", "learner"]
-    assert Path(read_design(str(start / "target.yaml")).robot).samefile(project / "robots" / "mine.yaml")
+    target = read_design(str(start / "target.yaml"))
+    assert Path(target.robot).samefile(project / "robots" / "mine.yaml")
+    points = read_settings(TaskSettings, "tasks", str(start / "points.yaml")).test[0]
+    assert points.waypoints == target.paths[0].waypoints == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
 
 
 def test_what_was_read_means_the_same_in_another_file(project):
