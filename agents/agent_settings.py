@@ -39,7 +39,7 @@ class OnPolicy(Learner):
     trace: Fraction = 0.95  # λ of generalised advantage estimation
     clip: PositiveFloat = 0.2
     initial_log_std: Annotated[float, Field(ge=-20.0, le=2.0)] = -0.7  # of exploration, as a share of the action
-    entropy: Annotated[float, Field(ge=0.0)] = 0.0
+    entropy: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0  # weight of exploration's entropy in the loss
 
     @model_validator(mode="after")
     def _batches_fit(self) -> Self:
@@ -126,8 +126,19 @@ class SACSettings(Learner):
     buffer: PositiveInt = 500_000  # transitions
     first_random: PositiveInt = 10_000  # steps before learning starts
     soft_update: Fraction = 0.005
-    entropy: PositiveFloat = 0.05  # coefficient to begin with; it is adapted
-    target_entropy: float = -2.0  # [nat] for each driven motor; exploration shrinks until it is reached
+    entropy: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05  # coefficient to begin with; it is adapted
+    target_entropy: Annotated[
+        float, Field(ge=-20.0, le=0.6931)
+    ] = -2.0  # [nat] for each driven motor; exploration shrinks until it is reached
+
+    @model_validator(mode="after")
+    def _learning_begins(self) -> Self:
+        if self.first_random >= self.steps:
+            raise ValueError(
+                f"'first_random' must be below the steps in all, {self.steps}, got {self.first_random}: nothing would "
+                "be learned"
+            )
+        return self
 
 
 class ComputedTorqueSettings(Frozen):

@@ -35,8 +35,6 @@ def changes_of(options: list[str] | None) -> dict[str, Any]:
         key, equals, value = option.partition("=")
         if not equals or not key:
             raise ValueError(f"--set needs KEY=VALUE, got {option!r}")
-        if key in parsed:
-            raise ValueError(f"--set {key} is given twice, got {option!r} after {key}={parsed[key]}")
         parsed[key] = parse_yaml(value, f"--set {option}")
     return parsed
 

@@ -20,7 +20,7 @@ from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse,
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
-from caster_gym.file_names import NameOrFile, beside_its_file, with_files_beside
+from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
@@ -84,7 +84,7 @@ class TaskSettings(ChosenTask):
     @classmethod
     def _arena_may_be_a_file(cls, arena: Any, info: ValidationInfo) -> Any:
         if isinstance(arena, str | Path):
-            return read_arena(beside_its_file(arena, info))
+            return read_arena(beside_its_file(arena, info) if is_file_name(str(arena)) else arena)
         return read_arena(arena) if arena is None else arena
 
     @field_validator("wrappers", "shaping", mode="before")

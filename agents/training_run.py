@@ -80,7 +80,7 @@ class Run:
         self._diverged = True
         rate = self.settings.learning_rate
         raise ValueError(
-            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}: set a smaller one"
+            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}: a smaller one helps"
         ) from cause
 
     def validate(self, actor: Actor) -> None:

@@ -185,7 +185,12 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         items = "item" if bound.endswith(" 1") else "items"
         return where, f" should have {bound} {items}, got {details['actual_length']}", ""
     message = _PLAIN.get(kind, re.sub(r"^(Value error, |\w+ (?=should))", "", problem["msg"]))
-    complete = not location or "got " in message or isinstance(details.get("error"), ConfigurationError)
+    complete = (
+        not location
+        or "got " in message
+        or message.startswith("there is no ")
+        or isinstance(details.get("error"), ConfigurationError)
+    )
     joint = " " if message.startswith(("should", "must", "needs")) else ": "
     return where, f"{joint if where else ''}{message}", "" if complete else f", got {_shortened(problem['input'])}"
 

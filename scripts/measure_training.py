@@ -39,6 +39,7 @@ from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
 from caster_gym.agents.metrics import yardstick
 from caster_gym.agents.protocol import Agent
+from caster_gym.agents.run_folder import check_can_be_made
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
 from caster_gym.agents.settings import TaskSettings, read_settings
@@ -283,6 +284,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--goal", type=float, default=GOAL, help="position RMSE [m] on validation paths")
     parser.add_argument("--out", type=Path, default=Path("runs/training.md"), help="file for the page")
     chosen = parser.parse_args(arguments)
+    check_can_be_made(chosen.out.with_suffix(""))
     task = read_settings(TaskSettings, "tasks", chosen.task)
     if task.environment != "track":
         raise ValueError(f"the goal is one of tracking, got a task of environment {task.environment!r}")

@@ -231,7 +231,7 @@ def test_completion_is_offered(call):
         (["--task", "lost.yaml"], "there is no file"),
         (
             ["--set", "learning_rate=1e9"],
-            "training has diverged after 64 steps, with a learning_rate of 1e+09: set a sma",
+            "training has diverged after 64 steps, with a learning_rate of 1e+09: a smalle",
         ),
         (["--set", "n_steps=8"], "unknown key 'n_steps'; it is called 'horizon' here"),
     ],
@@ -254,7 +254,7 @@ def test_a_start_that_fails_is_in_nobodys_way(call, tmp_path, wrong, message):
 
 def test_a_learning_rate_that_diverges_can_be_made_smaller(call):
     arguments = ["train", *TINY, "--task", "task.yaml", "--out", "run", "--set"]
-    assert_refused_at_last(call(*arguments, "learning_rate=1e9"), "set a smaller one")
+    assert_refused_at_last(call(*arguments, "learning_rate=1e9"), "a smaller one helps")
     assert call(*arguments, "learning_rate=1e-3").exit_code == 0
 
 
@@ -342,7 +342,10 @@ def test_mistakes_in_an_export_get_one_sentence(call, tmp_path, arguments, messa
             "there is no 'task' in tasks; did you mean the file 'task.yaml'?",
         ),
         (["train", "--task", "track.yaml"], "what comes with the package is called 'track'"),
-        (["train", "--set", "steps=1", "--set", "steps=2"], "--set steps is given twice"),
+        (
+            ["train", "sac", "--set", "steps=5000"],
+            "'first_random' must be below the steps in all, 5000, got 10000",
+        ),
         (["train", "--set", "hidden=[1e9]"], "number 1 of 'hidden' should be less than or equal to 16384"),
         (["train", "--set", "robots=1e12"], "robots at most"),
         (["watch", "--seconds", "1e400", "--save", "a.gif"], "seconds must be positive and finite, got inf"),
@@ -352,12 +355,16 @@ def test_mistakes_in_an_export_get_one_sentence(call, tmp_path, arguments, messa
         ),
         (["identify", "--example", "nowhere/a.csv"], "there is no folder 'nowhere' to write a.csv in; make it first"),
         (["reproduce", "chung"], "did you mean 'chung2008'?"),
+        (["train", "--task", "arena.yaml"], "'arena': an arena is a mapping or the name of a YAML file, got 'room'"),
+        (["train", "--task", "points.yaml"], "points.csv'"),
         (["design", "--set", "robot=7"], "'robot' should be text, got 7"),
     ],
 )
 def test_more_mistakes_get_one_sentence(call, tmp_path, arguments, message):
+    (tmp_path / "arena.yaml").write_text(yaml.safe_dump({**TASK, "arena": "room"}))
+    (tmp_path / "points.yaml").write_text(yaml.safe_dump({**TASK, "test": [{"shape": "spline", "file": "points.csv"}]}))
     assert_refused(call(*arguments), message)
-    assert [one.name for one in tmp_path.iterdir()] == ["task.yaml"]
+    assert {one.name for one in tmp_path.iterdir()} == {"task.yaml", "arena.yaml", "points.yaml"}
 
 
 def test_a_missing_library_is_named_with_its_extra(call, monkeypatch):

@@ -224,6 +224,8 @@ def test_mistakes_are_named():
         main(["--agents", "computed_torque"])
     with pytest.raises(ValueError, match="the goal is one of tracking, got a task of environment 'follow'"):
         main(["--task", "follow"])
+    with pytest.raises(ValueError, match="results cannot be written to /proc/training"):
+        main(["--out", "/proc/training.md"])
 
 
 def test_failures_on_test_paths_are_told_for_each_kind():
