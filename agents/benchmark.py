@@ -22,7 +22,7 @@ from .follow_metrics import FollowVerdict
 from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
-from .settings import BenchmarkSettings, TaskSettings, names_of, read_settings
+from .settings import BenchmarkSettings, TaskSettings, in_brief, names_of, read_settings
 from .summary import Result, table, write_episodes, write_summary
 from .threads import DEFAULT, limited_to, usable_cores
 from .track_metrics import TrackVerdict
@@ -140,7 +140,10 @@ def tune(settings: ComputedTorqueSettings, validation: Batch) -> tuple[ComputedT
     """The controller whose natural frequency [rad/s] does best on validation paths, as policies are chosen there."""
     plain = bare(validation)
     if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
-        raise ValueError(f"computed torque gives torques, but the task's actions are those of {redefining[0]!r}")
+        raise ValueError(
+            f"computed torque gives torques, but the task's actions are those of {in_brief(redefining[0])}: leave that "
+            "out of its wrappers"
+        )
     best: tuple[tuple[float, ...], ComputedTorque, float] | None = None
     for frequency in settings.natural_frequencies:
         agent = ComputedTorque(plain.engine.layout, frequency, plain.task.control_period, settings.known)

@@ -25,7 +25,7 @@ from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.specification import FeatureSpecification
 
 from .actor import Actor, LearnedAgent, Squash
-from .settings import ChosenTask
+from .settings import ChosenTask, in_brief
 
 FORMAT = 1
 SHOWN = 3  # of the policies that a message may name
@@ -96,7 +96,7 @@ _TOLD = {"s": "follow a timetable (environment 'track')", "m": "follow a path at
 
 
 def _named(features: Sequence[Feature]) -> str:
-    return ", ".join(repr(feature) for feature in features) or "torques"
+    return ", ".join(map(in_brief, features)) or "torques"
 
 
 def save_bundle(folder: Path, bundle: Bundle) -> None:

@@ -21,7 +21,7 @@ from .command_line import (
     plain_errors,
     progress,
 )
-from .run_folder import begun, check_file, staged
+from .run_folder import begun, check_file, check_free, staged
 from .settings import BenchmarkSettings, TaskSettings, read_settings
 
 MJCF_SUFFIXES = (".xml", ".mjcf")
@@ -102,6 +102,8 @@ def evaluate(
 
         tasks = read_settings(TaskSettings, "tasks", task)
         settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
+        for read in (Path(task), Path(tasks.robot)):
+            check_free(out, overwrite, kept=read)
         with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
             test = test_batch(tasks, tasks.test, starts)
             agent = ready_agent(policy, tasks, test)
@@ -130,7 +132,8 @@ def benchmark(
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
-        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=(Path(config), Path(settings.task))):
+        named = (config, settings.task, comparison.task.robot, *settings.agents)
+        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=tuple(map(Path, named))):
             text = run_benchmark(comparison, out, threads)
         typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")

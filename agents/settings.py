@@ -23,6 +23,7 @@ from caster_gym.envs.track_task import TrackTask
 from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
+from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
 
@@ -36,6 +37,7 @@ RewardSpecification: TypeAlias = Annotated[
     Potential | Tolerance | Effort | Smoothness | TractionUse | Impact, Field(discriminator="kind")
 ]
 
+SHOWN = 4  # of the items of a list in a message
 TASKS: dict[str, type[TrackTask | FollowTask]] = {"track": TrackTask, "follow": FollowTask}
 
 
@@ -106,18 +108,22 @@ class TaskSettings(ChosenTask):
                 if _first_of(path) in starts:
                     k = starts.index(_first_of(path))
                     raise ValueError(
-                        f"a {kind} path must not be among the {other} paths, got {_in_brief(path)} as {kind} path "
+                        f"a {kind} path must not be among the {other} paths, got {in_brief(path)} as {kind} path "
                         f"{i + 1} and as {other} path {k + 1}; {_remedy(path)}"
                     )
         return self
 
 
-def _in_brief(path: PathSpecification) -> str:
-    """A path as one would write it, without what is as always, and without all of its waypoints."""
-    content = {"shape": path.shape, **path.model_dump(mode="json", exclude_defaults=True)}
-    if isinstance(path, RandomPaths):
-        content = {"shape": path.shape, "seed": path.seed}
-    told = (f"{name}: {f'{len(it)} points' if name == 'waypoints' else it}" for name, it in content.items())
+def in_brief(one: PathSpecification | Feature) -> str:
+    """A path or a feature as one would write it: without what is as always, and without all points of long lists."""
+    name = "kind" if isinstance(one, Feature) else "shape"
+    content = {name: getattr(one, name), **one.model_dump(mode="json", exclude_defaults=True)}
+    if isinstance(one, RandomPaths):
+        content = {"shape": one.shape, "seed": one.seed}
+    told = (
+        f"{key}: {f'{len(it)} points' if isinstance(it, list) and len(it) > SHOWN else it}"
+        for key, it in content.items()
+    )
     return f"{{{', '.join(told)}}}"
 
 

@@ -1,6 +1,7 @@
 """Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control"""
 
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from gymnasium import register
@@ -33,4 +34,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    parts = (name for name, it in globals().items() if name.startswith("__") or isinstance(it, ModuleType))
+    return sorted({*parts, *__all__})

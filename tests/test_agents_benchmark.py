@@ -226,5 +226,5 @@ def test_following_is_compared_in_the_same_way(tmp_path):
 def test_computed_torque_is_refused_where_actions_are_no_torques(task):
     commanded = TaskSettings.model_validate({**task.model_dump(), "wrappers": ["twist_commands"]})
     settings = ComputedTorqueSettings(algorithm="computed torque")
-    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* those of TwistCommands"):
+    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
         tune(settings, test_batch(commanded, commanded.validation, starts=1))

@@ -206,3 +206,39 @@ def test_a_path_is_taken_as_it_is(tmp_path):
     assert find("agents", str(tmp_path / "mine.yaml")) == tmp_path / "mine.yaml"
     with pytest.raises(ConfigurationError, match=r"there is no file '.*mine\.yaml'"):
         read_agent(str(tmp_path / "mine.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("agent", "wrong", "advised"),
+    [
+        ("ppo", {"robots": 4}, {"robots": 4, "batch": 512}),
+        ("ppo", {"robots": 4}, {"robots": 16}),
+        ("ppo", {"robots": 4}, {"robots": 4, "horizon": 512}),
+        ("ppo_gpu", {"batch": 1000}, {"batch": 512}),
+        ("shac", {"robots": 8}, {"robots": 8, "critic_batch": 128}),
+        ("shac", {"robots": 8}, {"robots": 8, "window": 32}),
+        ("sac", {"steps": 5000}, {"steps": 5000, "first_random": 4999}),
+    ],
+)
+def test_advice_on_settings_that_do_not_fit_together_helps(agent, wrong, advised):
+    """What is advised stands in the message, and is accepted."""
+    with pytest.raises(ConfigurationError) as caught:
+        read_agent(agent, wrong)
+    words = {"robots": "more robots", "horizon": "longer horizon", "window": "longer window", "steps": "steps in all"}
+    for key, value in advised.items():
+        if wrong.get(key) != value:
+            assert words.get(key, key) in str(caught.value)
+            assert key in words or key == "first_random" or str(value) in str(caught.value)
+    read_agent(agent, advised)
+
+
+def test_advice_on_held_out_paths_helps():
+    shared = {"shape": "random_paths", "seed": 0, "duration": 5.0}
+    with pytest.raises(ConfigurationError, match="give one of them another seed"):
+        parse(TaskSettings, {**PATHS, "train": [shared], "test": [shared]}, "task")
+    parse(TaskSettings, {**PATHS, "train": [shared], "test": [{**shared, "seed": 3}]}, "task")
+    points = {"shape": "spline", "waypoints": [[0.1 * i, 0.01 * i * i] for i in range(60)]}
+    with pytest.raises(ConfigurationError, match=r"waypoints: 60 points\} as test path 2 .* or leave it out") as caught:
+        parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}, points]}, "task")
+    assert len(str(caught.value)) < 300
+    parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}]}, "task")
