@@ -1,6 +1,7 @@
 """caster_gym.agents.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
 
 import csv
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import yaml
 from numpy.testing import assert_array_equal
 
+from caster_gym.agents import benchmark
 from caster_gym.agents.agent_settings import ComputedTorqueSettings, read_agent
 from caster_gym.agents.benchmark import (
     Contender,
@@ -178,6 +180,32 @@ def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
     agent = read_agent(settings.agents[1], {"steps": 512})
     with pytest.raises(OSError, match="taken"):
         train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
+
+
+@pytest.mark.parametrize(("threads", "processes"), [((), 5), ((1,), 5), ((4,), 4), ((64,), 1)])
+def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, threads, processes):
+    """Each training run has one thread or those asked for; cores only say how many run at a time."""
+    pools, submitted = [], []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, workers, mp_context):
+            pools.append(workers)
+            super().__init__(1)
+
+    monkeypatch.setattr(benchmark, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(benchmark, "usable_cores", lambda: 16)
+    monkeypatch.setattr(benchmark, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
+    agent = read_agent(settings.agents[1], {"steps": 512})
+    train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
+    assert pools == [processes]
+    assert submitted == 5 * [threads[0] if threads else 1]
+
+
+def test_run_yaml_has_the_threads_of_everybody(finished):
+    folder, _ = finished
+    files = [folder / "run.yaml", *(folder / "policies").rglob("run.yaml")]
+    assert len(files) == 1 + len(SEEDS)
+    assert all(yaml.safe_load(file.read_text(encoding="utf-8"))["threads"] == 1 for file in files)
 
 
 def test_no_jobs_are_no_work():
