@@ -134,19 +134,22 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     return "; ".join(sentences)
 
 
-def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """The known name nearest to an unknown one, or all of them."""
+def did_you_mean(name: object, known: Iterable[str], usual: Mapping[str, str] = MappingProxyType({})) -> str:
+    """What others call so here, else the known name nearest to an unknown one, or all of them.
+
+    usual: as `Frozen.usual_names`, a known name or words for each that others use.
+    """
     names = sorted(known)
+    if here := usual.get(str(name)):
+        return f"it is called {here!r} here" if here in names else here
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
 def _advice(key: str, models: Iterable[type[BaseModel]]) -> str:
     """What to write instead of a key that none of the models has."""
-    for model in models:
-        if here := getattr(model, "usual_names", {}).get(key):
-            return f"it is called {here!r} here" if here in model.model_fields else here
-    return did_you_mean(key, {name for model in models for name in model.model_fields})
+    usual = {name: here for model in models for name, here in getattr(model, "usual_names", {}).items()}
+    return did_you_mean(key, {name for model in models for name in model.model_fields}, usual)
 
 
 def _misread(given: Any, read: Any) -> Iterator[tuple[tuple[int | str, ...], Any, str]]:
