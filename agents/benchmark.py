@@ -2,7 +2,6 @@
 
 import csv
 import multiprocessing
-import os
 import queue
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -12,9 +11,10 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
-from caster_gym.configuration import ConfigurationError
+from caster_gym.configuration import ConfigurationError, is_yaml
 
-from .bundle import load_bundle
+from .agent_settings import AgentSettings, ComputedTorqueSettings, LearnedSettings, read_agent
+from .bundle import DESCRIPTION, load_bundle
 from .computed_torque import ComputedTorque
 from .evaluation import Batch, Episodes, bare, roll_out, test_batch
 from .figures import write_figures
@@ -22,16 +22,9 @@ from .follow_metrics import FollowVerdict
 from .metrics import yardstick
 from .protocol import Agent
 from .provenance import write_provenance
-from .settings import (
-    AgentSettings,
-    BenchmarkSettings,
-    ComputedTorqueSettings,
-    LearnedSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from .settings import BenchmarkSettings, TaskSettings, in_brief, names_of, read_settings
 from .summary import Result, table, write_episodes, write_summary
+from .threads import DEFAULT, limited_to, usable_cores
 from .track_metrics import TrackVerdict
 from .training import train
 from .training_run import Validation, verdict_on
@@ -75,10 +68,11 @@ def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | No
     return Comparison(settings, read_settings(TaskSettings, "tasks", settings.task), agents)
 
 
-def run_benchmark(comparison: Comparison, folder: Path) -> str:
+def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) -> str:
     """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
 
-    The folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
+    threads: of each training run, of which there are as many at a time as the cores allow, and of the evaluation. The
+    folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
     """
     settings, task, agents = comparison
     jobs = [
@@ -93,10 +87,11 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
     test.reset(seed=settings.start_seed)
     test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
 
-    model_based = {
-        name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ComputedTorqueSettings)
-    }
-    train_all(jobs)
+    with limited_to(threads):
+        model_based = {
+            name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ComputedTorqueSettings)
+        }
+    train_all(jobs, threads)
     contenders: list[Contender] = []
     for name, agent in agents.items():
         if name in model_based:
@@ -105,7 +100,8 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
             learned = load_bundle(job.folder / "best").agent
             alone = sum(other.algorithm == job.agent.algorithm for other in agents.values()) == 1
             contenders.append(Contender(learned.name if alone else name, learned, job.seed))
-    results, episodes = compare(contenders, test, settings)
+    with limited_to(threads):
+        results, episodes = compare(contenders, test, settings)
 
     text = table(results, settings.confidence)
     write_episodes(folder / "episodes.csv", results)
@@ -116,6 +112,7 @@ def run_benchmark(comparison: Comparison, folder: Path) -> str:
     write_provenance(
         folder,
         benchmark=settings.model_dump(mode="json"),
+        threads=threads,
         task=task.model_dump(mode="json"),
         agents={name: agent.model_dump(mode="json") for name, agent in agents.items()},
         natural_frequencies={name: frequency for name, (_, frequency) in model_based.items()},
@@ -143,7 +140,10 @@ def tune(settings: ComputedTorqueSettings, validation: Batch) -> tuple[ComputedT
     """The controller whose natural frequency [rad/s] does best on validation paths, as policies are chosen there."""
     plain = bare(validation)
     if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
-        raise ValueError(f"computed torque gives torques, but the task's actions are those of {redefining[0]!r}")
+        raise ValueError(
+            f"computed torque gives torques, but the task's actions are those of {in_brief(redefining[0])}: leave that "
+            "out of its wrappers"
+        )
     best: tuple[tuple[float, ...], ComputedTorque, float] | None = None
     for frequency in settings.natural_frequencies:
         agent = ComputedTorque(plain.engine.layout, frequency, plain.task.control_period, settings.known)
@@ -159,30 +159,40 @@ def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
 
     Raises ValueError for a policy that does not fit the batch, and for an agent that must be trained first.
     """
-    if Path(name).is_dir():
-        bundle, plain = load_bundle(Path(name)), bare(batch)
-        bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
-        return bundle.agent
-    known = read_agent(name)
-    if not isinstance(known, ComputedTorqueSettings):
-        raise ValueError(f"agent {name!r} must be trained first: give the folder of its policy")
-    return tune(known, test_batch(settings, settings.validation, starts=1))[0]
+    folder = Path(name).expanduser()
+    named = name in names_of("agents") or (is_yaml(name) and folder.name != DESCRIPTION)
+    known = read_agent(name) if named else None
+    if isinstance(known, ComputedTorqueSettings) and not (folder / DESCRIPTION).is_file():
+        return tune(known, test_batch(settings, settings.validation, starts=1))[0]
+    if known is None and not folder.exists() and len(folder.parts) == 1:
+        model_based = [one for one in names_of("agents") if isinstance(read_agent(one), ComputedTorqueSettings)]
+        raise ValueError(
+            f"there is neither a folder of a policy nor a model-based agent called {name!r}; such are "
+            f"{', '.join(model_based)}"
+        )
+    if known is not None and not folder.is_dir():
+        raise ValueError(
+            f"agent {name!r} must be trained first: `caster-gym train {name} --out RUN` writes its policy to RUN/best, "
+            "which is the folder to give"
+        )
+    bundle, plain = load_bundle(folder), bare(batch)
+    bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
+    return bundle.agent
 
 
-def train_all(jobs: Sequence[Job]) -> None:
-    """Train all jobs, one per core at a time, with one progress bar over all their steps.
+def train_all(jobs: Sequence[Job], threads: int = DEFAULT) -> None:
+    """Train all jobs, as many at a time as there are cores for their threads, with one progress bar over all steps.
 
     Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised.
     """
     if not jobs:
         return
-    cores = os.cpu_count() or 1
-    workers = min(len(jobs), cores)
+    workers = max(1, min(len(jobs), usable_cores() // threads))
     context = multiprocessing.get_context("spawn")
     with context.Manager() as manager, _bar(jobs) as show:
         reports = manager.Queue()
         with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            futures = [pool.submit(_train_job, i, job, cores // workers, reports) for i, job in enumerate(jobs)]
+            futures = [pool.submit(_train_job, i, job, threads, reports) for i, job in enumerate(jobs)]
             try:
                 while not all(future.done() for future in futures):
                     _raise_errors(futures)

@@ -25,9 +25,10 @@ from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.specification import FeatureSpecification
 
 from .actor import Actor, LearnedAgent, Squash
-from .settings import ChosenTask
+from .settings import ChosenTask, in_brief
 
 FORMAT = 1
+SHOWN = 3  # of the policies that a message may name
 UNITS: dict[str, Literal["s", "m"]] = {"track": "s", "follow": "m"}  # of each environment's preview
 DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
 
@@ -95,7 +96,7 @@ _TOLD = {"s": "follow a timetable (environment 'track')", "m": "follow a path at
 
 
 def _named(features: Sequence[Feature]) -> str:
-    return ", ".join(repr(feature) for feature in features) or "torques"
+    return ", ".join(map(in_brief, features)) or "torques"
 
 
 def save_bundle(folder: Path, bundle: Bundle) -> None:
@@ -119,6 +120,8 @@ def save_bundle(folder: Path, bundle: Bundle) -> None:
 
 def load_bundle(folder: Path) -> Bundle:
     """Read a bundle. Raises ConfigurationError that says what is missing or does not fit."""
+    if not (folder / DESCRIPTION).is_file():
+        raise ConfigurationError(_no_policy(folder))
     content = read_yaml(folder / DESCRIPTION)
     if content.get("format") != FORMAT:
         raise ConfigurationError(
@@ -129,6 +132,27 @@ def load_bundle(folder: Path) -> Bundle:
     actor = Actor(description.layout.size, description.hidden, actions, description.squash)
     _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
     return Bundle(description, actor)
+
+
+def _no_policy(folder: Path) -> str:
+    """What to say of a folder that is no policy: where the policies are that it was perhaps meant for."""
+    if folder.is_file():
+        ours = folder.name in (DESCRIPTION, WEIGHTS)
+        return f"{folder} is a file{f' of a policy; give its folder, {folder.parent}' if ours else ', not a policy'}"
+    if not folder.is_dir():
+        near = sorted(one.parent for one in folder.parent.glob(f"*/{DESCRIPTION}"))
+        there = f"; there is {' and '.join(map(str, near[:SHOWN]))}" if near else ""
+        return f"there is no folder {str(folder)!r} of a policy{there}"
+    if (folder / "best" / DESCRIPTION).is_file():
+        return f"{folder} is the folder of a training run; give the policy in it that did best, {folder / 'best'}"
+    kept = sorted(one.parent for one in folder.glob(f"**/best/{DESCRIPTION}"))
+    inside = kept or sorted(one.parent for one in folder.glob(f"*/{DESCRIPTION}"))
+    if inside:
+        some = " or ".join(map(str, inside[:SHOWN])) + (
+            f" or one of {len(inside) - SHOWN} more" * (len(inside) > SHOWN)
+        )
+        return f"{folder} is no policy itself, but has policies in it: give {some}"
+    return f"there is no policy in {folder}: it has no {DESCRIPTION}, as folders have that `caster-gym train` writes"
 
 
 def _read_weights(path: Path) -> dict[str, torch.Tensor]:

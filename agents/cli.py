@@ -1,41 +1,52 @@
 """The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, identify, export."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from gymnasium.error import DependencyNotInstalled
-from tqdm import tqdm
 
-from caster_gym.configuration import parse_yaml
+import caster_gym
 
-from .run_folder import prepare
-from .settings import (
-    BenchmarkSettings,
-    ComputedTorqueSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
+from .agent_settings import ComputedTorqueSettings, read_agent
+from .command_line import (
+    NOTHING_WRITTEN,
+    PARTS_BAR,
+    Changes,
+    Out,
+    Overwrite,
+    TaskName,
+    Threads,
+    changes_of,
+    plain_errors,
+    progress,
 )
+from .run_folder import begun, check_file, check_free, staged
+from .settings import BenchmarkSettings, TaskSettings, read_settings
+
+MJCF_SUFFIXES = (".xml", ".mjcf")
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
+    rich_markup_mode=None,  # it takes a unit such as [s] for markup, and leaves it out
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
     help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
 )
 
-NOTHING_WRITTEN = "nothing was written"
-PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 
-Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Change a setting of the learned agents, e.g. --set steps=100000. May be repeated."),
-]
-TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"caster_gym {caster_gym.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_command(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Train, evaluate and compare controllers of omnidirectional robots on powered casters."""
 
 
 @app.command()
@@ -46,25 +57,25 @@ def train(
     out: Out = Path("runs/train"),
     overwrite: Overwrite = False,
     change: Changes = None,
+    threads: Threads = 1,
 ) -> None:
     """Train a policy; the best one on validation paths is OUT/best, a folder that `evaluate` reads."""
-    with _plain_errors():
+    with plain_errors():
         from .metrics import in_words
         from .training import train as run
 
-        settings = read_agent(agent, _parsed(change))
+        settings = read_agent(agent, changes_of(change))
         if isinstance(settings, ComputedTorqueSettings):
-            raise ValueError(f"agent {agent!r} does not learn; compare it with `caster-gym benchmark`")
+            raise ValueError(f"agent {agent!r} does not learn; try it with `caster-gym evaluate {agent}`")
         tasks = read_settings(TaskSettings, "tasks", task)
-        prepare(out, overwrite)
-        with tqdm(total=settings.steps, desc=f"{agent} seed {seed}", unit="step", unit_scale=True) as bar:
+        kept = (Path(agent), Path(task), Path(tasks.robot))
+        bar = {"total": settings.steps, "desc": f"{Path(agent).stem} seed {seed}", "unit": "step", "unit_scale": True}
+        with begun(out, overwrite, "best/policy.yaml", kept), progress(**bar) as show:
 
             def report(steps: int, verdict: str) -> None:
-                bar.n = min(steps, settings.steps)
-                bar.set_postfix_str(verdict, refresh=False)
-                bar.refresh()
+                show(min(steps, settings.steps), verdict)
 
-            best = run(tasks, settings, seed, out, report)
+            best = run(tasks, settings, seed, out, report, threads)
         typer.echo(
             f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: {in_words(best.verdict)}. "
             f"It is in {out / 'best'}."
@@ -78,28 +89,31 @@ def evaluate(
     starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
     out: Out = Path("runs/evaluate"),
     overwrite: Overwrite = False,
+    threads: Threads = 1,
 ) -> None:
     """Try an agent on the test paths of a task: a table, every episode as CSV, and figures."""
-    with _plain_errors():
+    with plain_errors():
         from .benchmark import Contender, compare, ready_agent
         from .evaluation import bare, test_batch
         from .figures import write_figures
         from .provenance import write_provenance
         from .summary import table, write_episodes, write_summary
+        from .threads import limited_to
 
         tasks = read_settings(TaskSettings, "tasks", task)
         settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
-        test = test_batch(tasks, tasks.test, starts)
-        agent = ready_agent(policy, tasks, test)
-        contender = Contender(agent.name, agent, None)
-        prepare(out, overwrite, kept=Path(policy))
-        results, episodes = compare([contender], test, settings)
-        text = table(results, settings.confidence)
-        write_episodes(out / "episodes.csv", results)
-        write_summary(out / "summary.csv", results, settings.confidence)
-        (out / "table.md").write_text(text + "\n", encoding="utf-8")
-        write_figures(out, episodes, {}, bare(test).engine.plan)
-        write_provenance(out, policy=policy, task=tasks.model_dump(mode="json"), starts=starts)
+        for read in (Path(task), Path(tasks.robot)):
+            check_free(out, overwrite, kept=read)
+        with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
+            test = test_batch(tasks, tasks.test, starts)
+            agent = ready_agent(policy, tasks, test)
+            results, episodes = compare([Contender(agent.name, agent, None)], test, settings)
+            text = table(results, settings.confidence)
+            write_episodes(folder / "episodes.csv", results)
+            write_summary(folder / "summary.csv", results, settings.confidence)
+            (folder / "table.md").write_text(text + "\n", encoding="utf-8")
+            write_figures(folder, episodes, {}, bare(test).engine.plan)
+            write_provenance(folder, policy=policy, task=tasks.model_dump(mode="json"), starts=starts, threads=threads)
         typer.echo(text)
         typer.echo(f"Results and figures are in {out}.")
 
@@ -110,15 +124,18 @@ def benchmark(
     out: Out = Path("runs/benchmark"),
     overwrite: Overwrite = False,
     change: Changes = None,
+    threads: Threads = 1,
 ) -> None:
     """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
-    with _plain_errors():
+    with plain_errors():
         from .benchmark import read_comparison, run_benchmark
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
-        comparison = read_comparison(settings, _parsed(change))
-        prepare(out, overwrite)
-        typer.echo(run_benchmark(comparison, out))
+        comparison = read_comparison(settings, changes_of(change))
+        named = (config, settings.task, comparison.task.robot, *settings.agents)
+        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=tuple(map(Path, named))):
+            text = run_benchmark(comparison, out, threads)
+        typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")
 
 
@@ -140,10 +157,12 @@ def watch(
     seconds: Annotated[float | None, typer.Option(help="Stop after that time.")] = None,
 ) -> None:
     """Show an agent on the test paths of a task, or drive yourself: in a window, or as a film."""
-    with _plain_errors():
+    with plain_errors():
+        from .threads import DEFAULT, limited_to
         from .watch import watch as run
 
-        frames = run(agent, task, path, robots, seed, save, overwrite, seconds)
+        with limited_to(DEFAULT):
+            frames = run(agent, task, path, robots, seed, save, overwrite, seconds)
         if save is not None:
             typer.echo(f"{frames} frames are in {save}.")
 
@@ -155,17 +174,12 @@ def reproduce(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that page and its folder.")] = False,
 ) -> None:
     """Compute everything that a paper computes: figures, tables, and a page with each printed number beside ours."""
-    with _plain_errors(NOTHING_WRITTEN):
+    with plain_errors(NOTHING_WRITTEN):
         from .reproduction import find_paper
         from .reproduction import reproduce as run
 
-        with tqdm(total=len(find_paper(paper).parts), desc=paper, bar_format=PARTS_BAR) as bar:
-
-            def report(work: str, done: int) -> None:
-                bar.n = done
-                bar.set_postfix_str(work)
-
-            verdict = run(paper, out, overwrite, report)
+        with progress(total=len(find_paper(paper).parts), desc=paper, bar_format=PARTS_BAR) as show:
+            verdict = run(paper, out, overwrite, lambda work, done: show(done, work))
         share = f"{verdict.agreeing} of {verdict.compared}"
         typer.echo(f"{share} printed numbers and statements agree; {out / paper}.md shows all.")
         if verdict.unexplained:
@@ -188,17 +202,13 @@ def design(
     ] = None,
 ) -> None:
     """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
-    with _plain_errors(NOTHING_WRITTEN):
+    with plain_errors(NOTHING_WRITTEN):
         from .design import design as run
         from .design import read_design
 
-        settings = read_design(target, robot, _parsed(change))
-        with tqdm(total=100, desc=f"design of {settings.robot}", unit="%") as bar:
-
-            def report(share: float) -> None:
-                bar.update(round(100.0 * share) - bar.n)
-
-            words = run(settings, out, overwrite, report)
+        settings = read_design(target, robot, changes_of(change))
+        with progress(total=100, desc=f"design of {Path(settings.robot).stem}", unit="%") as show:
+            words = run(settings, out, overwrite, lambda share: show(round(100.0 * share)))
         typer.echo(f"{words} The page, the picture, the table of motors and the robot file are in {out}.")
 
 
@@ -228,7 +238,7 @@ def identify(
     ] = None,
 ) -> None:
     """Payload, friction and trail of a robot from a recording: estimates with intervals, a page and a robot file."""
-    with _plain_errors(NOTHING_WRITTEN):
+    with plain_errors(NOTHING_WRITTEN):
         from .identify import PAYLOAD, read_identify, write_example
         from .identify import identify as run
 
@@ -237,9 +247,10 @@ def identify(
             return
         if recording is None or example is not None:
             raise ValueError("give either a recording, or --example with the file to write one to")
-        settings = read_identify(robot, unknown or PAYLOAD, _parsed(change))
-        with tqdm(desc="identify", unit="step") as bar:
-            words = run(recording, settings, out, overwrite, bar.update)
+        settings = read_identify(robot, unknown or PAYLOAD, changes_of(change))
+        step = count(1)
+        with progress(desc="identify", unit="step") as show:
+            words = run(recording, settings, out, overwrite, lambda: show(next(step)))
         typer.echo(words)
         typer.echo(f"The page, the figure and robot.yaml are in {out}.")
 
@@ -248,47 +259,30 @@ def identify(
 def export(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of its YAML file.")],
     mjcf: Annotated[Path, typer.Option(help="File for the robot as a MuJoCo model, such as robot.xml.")],
-    time_step: Annotated[float, typer.Option(help="Of the model [s]; MuJoCo's slip falls in proportion to it.")] = 2e-3,
+    time_step: Annotated[
+        float, typer.Option(help="Time step of the model [s]; MuJoCo's slip falls in proportion to it.")
+    ] = 2e-3,
     friction: Annotated[
-        float, typer.Option(help="Between wheels and floor; a great one comes nearest to rolling.")
+        float,
+        typer.Option(
+            help="Coefficient of friction between wheels and floor [-]; a great one comes nearest to rolling."
+        ),
     ] = 5.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
 ) -> None:
     """Write a robot as a model for MuJoCo (MJCF): bodies, joints, gears and motors, wheels that roll by friction."""
-    with _plain_errors():
+    with plain_errors():
         from caster_gym.export.mjcf import mjcf as model
         from caster_gym.robot import load_robot
 
+        if mjcf.suffix.lower() not in MJCF_SUFFIXES:
+            better = mjcf.with_suffix(".xml").name
+            raise ValueError(f"what is written is MJCF, for MuJoCo, got the name {mjcf.name!r}; call it {better!r}")
         text = model(load_robot(robot), time_step, friction)
-        if mjcf.exists() and not overwrite:
-            raise ValueError(f"{mjcf} is there already; choose another --mjcf, or --overwrite it")
+        check_file(mjcf, overwrite, "--mjcf")
         mjcf.write_text(text, encoding="utf-8")
         typer.echo(f"The model is in {mjcf}.")
 
 
-def _parsed(changes: list[str] | None) -> dict[str, Any]:
-    """Settings from KEY=VALUE, values read as YAML."""
-    parsed = {}
-    for change in changes or []:
-        key, equals, value = change.partition("=")
-        if not equals or not key:
-            raise ValueError(f"--set needs KEY=VALUE, got {change!r}")
-        parsed[key] = parse_yaml(value, f"--set {change}")
-    return parsed
-
-
-@contextmanager
-def _plain_errors(interrupted: str = "what was finished is kept") -> Iterator[None]:
-    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C that says what is left."""
-    try:
-        yield
-    except (ValueError, OSError, DependencyNotInstalled) as error:
-        typer.echo(f"caster-gym: {error}", err=True)
-        raise typer.Exit(2) from error
-    except KeyboardInterrupt:
-        typer.echo(f"caster-gym: interrupted; {interrupted}", err=True)
-        raise typer.Exit(130) from None
-
-
 if __name__ == "__main__":
-    app()
+    app(prog_name="caster-gym")

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import field_validator
 
 from caster_gym.analysis.design import Design, DesignTarget, check_designable, optimise
 from caster_gym.analysis.sizing import MotorRequirement, Requirement, require
 from caster_gym.analysis.target import driven_as
 from caster_gym.configuration import parse, read_yaml
+from caster_gym.file_names import NameOrFile, from_working_folder, with_files_beside
 from caster_gym.robot import Robot, load_robot
 
 from .design_figures import write_design_figure
@@ -54,7 +56,9 @@ MEANINGS = {
 class DesignSettings(DesignTarget):
     """A target, and the robot that is to meet it."""
 
-    robot: str = "chung2008"  # name, or path of a YAML file
+    robot: NameOrFile = "chung2008"  # name, or path of a YAML file
+
+    _files_beside = field_validator("paths", mode="before")(with_files_beside)
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,17 @@ class DesignReport:
     after: Requirement
 
 
-def read_design(target: str, robot: str | None = None, changes: Mapping[str, Any] | None = None) -> DesignSettings:
+def read_design(
+    target: str | Path, robot: str | None = None, changes: Mapping[str, Any] | None = None
+) -> DesignSettings:
     """Settings from a name in configs/designs or a YAML file, with some of them changed.
 
     Raises ValueError for settings that are wrong by themselves, and for those with which the robot cannot be designed.
     """
     path = find("designs", target)
-    content = {**read_yaml(path), **(changes or {}), **({} if robot is None else {"robot": robot})}
-    settings = parse(DesignSettings, content, str(path))
+    given = {**(changes or {}), **({} if robot is None else {"robot": robot})}
+    source = f"{path}, as changed" if given else str(path)
+    settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, source, path.parent)
     check_designable(load_robot(settings.robot), settings)
     return settings
 

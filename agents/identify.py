@@ -20,7 +20,7 @@ from caster_gym.robot import load_robot
 
 from .identify_figures import write_identify_figure
 from .provenance import write_provenance
-from .run_folder import check_free, staged
+from .run_folder import check_file, check_free, staged
 
 PAYLOAD = ("payload_mass", "payload_x", "payload_y")
 EXAMPLE_NOISE = Noise(position=1e-3, heading=2e-3, velocity=1e-2, yaw_rate=1e-2, steering=2e-3)
@@ -80,8 +80,7 @@ def identify(
 
 def write_example(path: Path, robot: str, seed: int, overwrite: bool) -> str:
     """A recording of a robot that carries a payload which its file does not know, with noise; says what it carries."""
-    if path.exists() and not overwrite:
-        raise ValueError(f"{path} is there already; choose another --example, or --overwrite it")
+    check_file(path, overwrite, "--example")
     bare = load_robot(robot)
     reach = max(float(np.hypot(caster.x, caster.y)) for caster in bare.casters)
     load = {"payload_mass": 0.2 * bare.platform.mass, "payload_x": 0.4 * reach, "payload_y": -0.2 * reach}

@@ -94,8 +94,6 @@ def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int]
 
 def _check_out(name: str, out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be had, and one with pages of the same names that are not ours."""
-    if out.exists() and not out.is_dir():
-        raise ValueError(f"{out} is a file; --out needs a folder")
     check_free(out / name, overwrite)
     page, differences = out / f"{name}.md", out / "differences.md"
     if page.exists() and not (out / name / MARK).is_file():

@@ -12,7 +12,7 @@ from torch import Tensor
 from caster_gym.envs.torch_vector_env import TorchVectorEnv
 
 from .actor import Actor
-from .settings import RslPPOSettings
+from .agent_settings import RslPPOSettings
 from .tensors import torch_fields
 from .training_run import Run
 
@@ -134,10 +134,7 @@ def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
                 group["lr"] = rate
             runner.learn(1)
             steps += round_
-            run.logger.record("train/learning_rate", rate)
-            run.logger.record(
-                "train/std", runner.alg.get_policy().distribution.log_std_param.detach().exp().mean().item()
-            )
-            run.logger.dump(steps)
+            std = runner.alg.get_policy().distribution.log_std_param.detach().exp().mean().item()
+            run.record(steps, {"train/learning_rate": rate, "train/std": std})
     finally:
         run.finish(steps, lambda: actor_of(runner, settings))

@@ -8,9 +8,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from .actor import Actor
+from .agent_settings import Learner, PPOSettings, SACSettings
 from .evaluation import training_batch
 from .sb3_environment import CasterVecEnv
-from .settings import Learner, PPOSettings, SACSettings
 from .training_run import Run
 
 
@@ -94,5 +94,9 @@ def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
     learner.set_logger(run.logger)
     try:
         learner.learn(settings.steps, callback=Watcher(run))
+    except ValueError as error:
+        if "of distribution" in str(error):  # as Torch says of actions that are drawn from no numbers
+            run.diverged(learner.num_timesteps, error)
+        raise
     finally:
         run.finish(learner.num_timesteps, lambda: actor_of(learner, settings))

@@ -19,7 +19,8 @@ from caster_gym.engines.time_step import longest_time_step, substeps_for
 from caster_gym.envs.torch_task import TaskOutcome, TorchTask
 
 from .actor import Actor
-from .settings import SHACSettings, TaskSettings
+from .agent_settings import SHACSettings
+from .settings import TaskSettings
 from .tensors import check_compiler, torch_fields
 from .training_run import Run
 
@@ -197,9 +198,7 @@ def _fewest_substeps(task: TaskSettings) -> int:
 
 
 def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
-    """Train on tensors; on a CPU in one thread, since batches this small gain nothing from others and wait for them."""
-    if torch.device(settings.device).type == "cpu":
-        torch.set_num_threads(1)
+    """Train on tensors."""
     learner = ShortHorizon(make_task(run.task, settings), settings, run.seed)
     steps = 0
     try:
@@ -207,9 +206,7 @@ def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
             run.advance(steps, lambda: frozen(learner.actor))
             facts = learner.improve(steps / settings.steps)
             steps += settings.window * settings.robots
-            for name, value in facts.items():
-                run.logger.record(f"train/{name}", value)
-            run.logger.dump(steps)
+            run.record(steps, {f"train/{name}": value for name, value in facts.items()})
     finally:
         run.finish(steps, lambda: frozen(learner.actor))
 

@@ -4,7 +4,8 @@ from typing import Any
 
 import torch
 
-from .settings import OnTensors, TaskSettings
+from .agent_settings import OnTensors
+from .settings import TaskSettings
 
 
 def torch_fields(task: TaskSettings) -> dict[str, Any]:
@@ -15,7 +16,7 @@ def torch_fields(task: TaskSettings) -> dict[str, Any]:
     for kind, features in (("wrappers", task.wrappers), ("shaping", task.shaping)):
         if features:
             raise ValueError(
-                f"{kind} work on NumPy arrays, not on tensors: train with algorithm 'ppo' or 'sac', "
+                f"{kind!r} of the task need NumPy arrays, and this agent works on tensors: train agent 'ppo' or 'sac', "
                 f"or leave out {', '.join(repr(feature.kind) for feature in features)}"
             )
     return {"robot": task.robot, "path": task.train, "actuation": task.actuation, "arena": task.arena}

@@ -7,27 +7,27 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import torch
-
+from .agent_settings import LearnedSettings, RslPPOSettings, SHACSettings
 from .provenance import write_provenance
 from .sb3_learning import learn_with_sb3
-from .settings import LearnedSettings, RslPPOSettings, SHACSettings, TaskSettings
+from .settings import TaskSettings
+from .threads import DEFAULT, limited_to
 from .training_run import Report, Run, Validation
 
 
 def train(
-    task: TaskSettings, settings: LearnedSettings, seed: int, folder: Path, report: Report, threads: int = 2
+    task: TaskSettings, settings: LearnedSettings, seed: int, folder: Path, report: Report, threads: int = DEFAULT
 ) -> Validation:
     """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
     Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
     """
-    torch.set_num_threads(threads)
     learn = _learning(settings)
     run = Run(folder, task, settings, seed, report)
     completed = False
     try:
-        learn(run, settings)
+        with limited_to(threads):
+            learn(run, settings)
         completed = True
     finally:
         if run.history:

@@ -2,21 +2,23 @@
 
 import csv
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import KVWriter, configure
 
 from .actor import Actor
+from .agent_settings import LearnedSettings
 from .bundle import Bundle, PolicyDescription, save_bundle
 from .evaluation import Batch, bare, roll_out, test_batch
 from .metrics import Verdict, in_words, yardstick
 from .protocol import Agent
 from .provenance import versions
-from .settings import LearnedSettings, TaskSettings
+from .settings import TaskSettings
 
 VALIDATION_SEED = 500
+STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
 Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
 
 
@@ -43,7 +45,7 @@ def verdict_on(agent: Agent, validation: Batch) -> Verdict:
 class Run:
     """The folder of a training run: validates policies, keeps them all and the best one, and tells how far it is.
 
-    steps: done so far. logger: for what else there is to record; it writes progress.csv and TensorBoard events.
+    steps: done so far. logger: what SB3 records by; it writes progress.csv and TensorBoard events.
     """
 
     def __init__(self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, report: Report) -> None:
@@ -54,6 +56,7 @@ class Run:
         self.history: list[Validation] = []
         self.best: Validation | None = None
         self.steps = 0
+        self._diverged = False
         self._validating = 0.0
         self._started = time.perf_counter()
         self._due = settings.steps / settings.validations
@@ -67,27 +70,47 @@ class Run:
         self.report(steps, in_words(self.history[-1].verdict) if self.history else "")
 
     def finish(self, steps: int, actor: Callable[[], Actor]) -> None:
-        """Validate what has been learned since the last time."""
+        """Validate what has been learned since the last time, unless that has diverged."""
         self.steps = steps
-        if not self.history or self.history[-1].steps < steps:
+        if not self._diverged and (not self.history or self.history[-1].steps < steps):
             self.validate(actor())
+
+    def diverged(self, steps: int, cause: BaseException | None = None) -> NoReturn:
+        """End the run, whose policy is no longer one; what was validated before is kept."""
+        self._diverged = True
+        rate = self.settings.learning_rate
+        raise ValueError(
+            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}: a smaller one helps"
+        ) from cause
 
     def validate(self, actor: Actor) -> None:
         """Try a policy on the validation paths, keep it, and keep it as the best one if it is."""
+        if not all(bool(weights.isfinite().all()) for weights in actor.state_dict().values()):
+            self.diverged(self.steps)
         begun = time.perf_counter()
         bundle = Bundle(self._describe(actor), actor)
         result = Validation(
             self.steps, begun - self._started - self._validating, verdict_on(bundle.agent, self.validation)
         )
         self.history.append(result)
-        for name, value in result.numbers.items():
-            self.logger.record(f"validation/{name}", value)
+        self.record(self.steps, {f"validation/{name}": value for name, value in result.numbers.items()})
         save_bundle(self.folder / "checkpoints" / f"{self.steps:010d}", bundle)
         if self.best is None or result.verdict.merit > self.best.verdict.merit:
             self.best = result
             save_bundle(self.folder / "best", bundle)
         self._write_history()
         self._validating += time.perf_counter() - begun
+
+    def record(self, steps: int, numbers: Mapping[str, float]) -> None:
+        """Write numbers to progress.csv and TensorBoard at once, at their own step.
+
+        SB3 dumps what its logger was told when its next round ends: at a later step, and never after the last one.
+        """
+        values = {STEPS: steps, **numbers}
+        excluded: dict[str, tuple[str, ...]] = {name: ("tensorboard",) if name == STEPS else () for name in values}
+        for writer in self.logger.output_formats:
+            assert isinstance(writer, KVWriter)
+            writer.write(values, excluded, steps)
 
     def _describe(self, actor: Actor) -> PolicyDescription:
         return PolicyDescription(

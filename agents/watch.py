@@ -90,9 +90,9 @@ def watch(
 
 def _check(driving: bool, robots: int, seconds: float | None) -> None:
     if not 1 <= robots <= MOST or (driving and robots != 1):
-        raise ValueError(f"robots must be 1{'' if driving else f' … {MOST}'}, got {robots}")
-    if seconds is not None and not seconds > 0.0:
-        raise ValueError(f"seconds must be positive, got {seconds}")
+        raise ValueError(f"robots must be 1{' with the keyboard' if driving else f' … {MOST}'}, got {robots}")
+    if seconds is not None and not 0.0 < seconds < np.inf:
+        raise ValueError(f"seconds must be positive and finite, got {seconds}")
 
 
 def _batch(settings: TaskSettings, robots: int) -> Batch:
@@ -108,7 +108,8 @@ def _index(path: str | int, batch: Batch) -> int:
             raise ValueError(unknown_name("test path", path, names))
         return names.index(path)
     if not 0 <= int(path) < len(names):
-        raise ValueError(f"path must lie in 0 … {len(names) - 1} or be a name, got {path}")
+        there = f"a number from 0 to {len(names) - 1}" if len(names) > 1 else "0"
+        raise ValueError(f"path must be {there}, or the name of a test path such as {names[0]!r}, got {path}")
     return int(path)
 
 

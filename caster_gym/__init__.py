@@ -1,6 +1,7 @@
 """Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control"""
 
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from gymnasium import register
@@ -30,3 +31,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'caster_gym' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    parts = (name for name, it in globals().items() if name.startswith("__") or isinstance(it, ModuleType))
+    return sorted({*parts, *__all__})

@@ -8,12 +8,14 @@ import re
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from caster_gym.file_names import FOLDER
 
 LONGEST_VALUE = 80  # characters of a value in a message
 
@@ -22,6 +24,9 @@ class Frozen(BaseModel):
     """Parameters that are checked once and never change. Words and yes/no are not taken for numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    # What others call a field, or what is not set here: the field's name here, or where to set it, in words
+    usual_names: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     @model_validator(mode="wrap")
     @classmethod
@@ -68,6 +73,11 @@ _Loader.add_implicit_resolver(
 )
 
 
+def is_yaml(path: str | Path) -> bool:
+    """Whether a name is that of a YAML file, by its suffix."""
+    return Path(path).suffix.lower() in (".yaml", ".yml")
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds a mapping."""
     try:
@@ -78,7 +88,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise ConfigurationError(f"{path} cannot be read as YAML: {error}") from error
     content = parse_yaml(text, str(path))
     if not isinstance(content, dict):
-        raise ConfigurationError(f"{path} must hold a mapping of keys to values, got {type(content).__name__}")
+        kind = {"NoneType": "nothing", "list": "a list", "str": "words"}.get(type(content).__name__, repr(content))
+        raise ConfigurationError(f"{path} must hold a mapping of keys to values, got {kind}")
     return content
 
 
@@ -94,10 +105,13 @@ def parse_yaml(text: str, source: str) -> Any:
         raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 
 
-def parse(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
-    """A checked model; errors become sentences that name the source, the key and the value."""
+def parse(model: type[Model], content: Mapping[str, Any], source: str, folder: Path | None = None) -> Model:
+    """A checked model; errors become sentences that name the source, the key and the value.
+
+    folder: of the file that the content was read from; relative names of files in the content start there.
+    """
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context={FOLDER: folder})
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {describe(error, model)}") from error
 
@@ -119,11 +133,22 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     return "; ".join(", ".join(where) + wrong for wrong, where in places.items())
 
 
-def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """The known name nearest to an unknown one, or all of them."""
+def did_you_mean(name: object, known: Iterable[str], usual: Mapping[str, str] = MappingProxyType({})) -> str:
+    """What others call so here, else the known name nearest to an unknown one, or all of them.
+
+    usual: as `Frozen.usual_names`, a known name or words for each that others use.
+    """
     names = sorted(known)
+    if here := usual.get(str(name)):
+        return f"it is called {here!r} here" if here in names else here
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
+
+
+def _advice(key: str, models: Iterable[type[BaseModel]]) -> str:
+    """What to write instead of a key that none of the models has."""
+    usual = {name: here for model in models for name, here in getattr(model, "usual_names", {}).items()}
+    return did_you_mean(key, {name for model in models for name in model.model_fields}, usual)
 
 
 def _misread(given: Any, read: Any) -> Iterator[tuple[tuple[int | str, ...], Any, str]]:
@@ -146,8 +171,8 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
     kind, location, details = problem["type"], problem["loc"], problem.get("ctx", {})
     if kind == "extra_forbidden":
         place, key = _place(model, location[:-1]), str(location[-1])
-        known = {name for one in place.members if _is_model(one) for name in one.model_fields}
-        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {did_you_mean(key, known)}", ""
+        models = [one for one in place.members if _is_model(one)]
+        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {_advice(key, models)}", ""
     where = str(_place(model, location))
     if kind == "missing":
         return where, " is missing", ""
@@ -159,9 +184,15 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         return where, f": {details['discriminator']} is missing", ""
     if kind in ("too_short", "too_long") and "actual_length" in details:
         bound = f"at least {details['min_length']}" if kind == "too_short" else f"at most {details['max_length']}"
-        return where, f" should have {bound} items, got {details['actual_length']}", ""
+        items = "item" if bound.endswith(" 1") else "items"
+        return where, f" should have {bound} {items}, got {details['actual_length']}", ""
     message = _PLAIN.get(kind, re.sub(r"^(Value error, |\w+ (?=should))", "", problem["msg"]))
-    complete = not location or "got " in message or isinstance(details.get("error"), ConfigurationError)
+    complete = (
+        not location
+        or "got " in message
+        or message.startswith("there is no ")
+        or isinstance(details.get("error"), ConfigurationError)
+    )
     joint = " " if message.startswith(("should", "must", "needs")) else ": "
     return where, f"{joint if where else ''}{message}", "" if complete else f", got {_shortened(problem['input'])}"
 
@@ -169,6 +200,7 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
 _PLAIN = {  # for what pydantic says in terms of Python
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "should be a mapping of keys to values"),
     **dict.fromkeys(("tuple_type", "list_type"), "should be a list"),
+    "string_type": "should be text",
     **dict.fromkeys(("float_type", "float_parsing"), "should be a number"),
     **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "should be a whole number"),
 }

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from caster_gym import Robot, load_robot
+from caster_gym.agents.run_folder import check_can_be_made
 from caster_gym.engines.threads import get_threads
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import draw_growth, growth_rows
@@ -98,6 +99,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--turns", type=int, help=f"instead of {TURNS}")
     parser.add_argument("--out", type=Path, metavar="FILE.md", help="file for the page; FILE/ gets what belongs to it")
     chosen = parser.parse_args(arguments)
+    folder = Path("speed") if chosen.out is None else chosen.out.with_suffix("")
+    if chosen.out is not None:
+        check_can_be_made(folder)
     turns, seconds = (QUICK_TURNS, QUICK_SECONDS) if chosen.quick else (TURNS, SECONDS)
     turns = chosen.turns or turns
     robot, cores, load = load_robot(chosen.robot), min(2, get_threads()), os.getloadavg()[0]
@@ -108,7 +112,6 @@ def main(arguments: list[str] | None = None) -> None:
     measured = run([*(row for _, _, rows in parts for row in rows), *growth], turns)
     command = shlex.join(["python", "-m", "scripts.measure_speed", *(sys.argv[1:] if arguments is None else arguments)])
     occasion = Occasion(command, turns, seconds, cores, (load, os.getloadavg()[0]), chosen.quick)
-    folder = Path("speed") if chosen.out is None else chosen.out.with_suffix("")
     text = page(parts, measured, accuracy, robot.name, operations_of_a_step(robot), folder.name, occasion)
     if chosen.out is None:
         print(text)

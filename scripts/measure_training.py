@@ -2,8 +2,9 @@
 
 First, what simulation costs PPO: control periods per second of training on our robots and on robots that cost nothing,
 which answer with arrays of the same shapes drawn beforehand; turn by turn, so that a busy moment hits both. Then, how
-long each learner takes until its policy follows validation paths as well as asked, all in the same run. The command
-writes a page, and a figure and a table in a folder beside it.
+long each learner takes until its policy follows validation paths as well as asked; and what a second thread does
+beside other busy processes, all in the same run. The command writes a page, and a figure and a table in a folder beside
+it.
 """
 
 import argparse
@@ -26,26 +27,27 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from tqdm import tqdm
 
 from caster_gym.agents.actor import Actor
-from caster_gym.agents.bundle import load_bundle
-from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
-from caster_gym.agents.metrics import yardstick
-from caster_gym.agents.protocol import Agent
-from caster_gym.agents.sb3_environment import CasterVecEnv
-from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
-from caster_gym.agents.settings import (
+from caster_gym.agents.agent_settings import (
     ComputedTorqueSettings,
     LearnedSettings,
     PPOSettings,
     RslPPOSettings,
     SHACSettings,
-    TaskSettings,
     read_agent,
-    read_settings,
 )
+from caster_gym.agents.bundle import load_bundle
+from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
+from caster_gym.agents.metrics import yardstick
+from caster_gym.agents.protocol import Agent
+from caster_gym.agents.run_folder import check_can_be_made
+from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
+from caster_gym.agents.settings import TaskSettings, read_settings
 from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_task
 from caster_gym.agents.training_run import Run
 from caster_gym.engines.threads import set_threads
 from scripts.speed_timing import RATE, Row, middle, run
+from scripts.training_busy import Beside, train_beside
 from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page
 
 BANK = 64  # steps drawn beforehand
@@ -166,6 +168,12 @@ def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
     ]
 
 
+def beside_others(task: TaskSettings, settings: PPOSettings) -> Beside:
+    """PPO on our robots with one thread and with two, beside busy processes."""
+    environment = CasterVecEnv(training_batch(task, settings.robots))
+    return train_beside(make_learner(settings, environment, seed=0), settings.robots * settings.horizon)
+
+
 def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
     """Control periods of training per second of the processor, over one round of collecting and updating.
 
@@ -276,6 +284,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--goal", type=float, default=GOAL, help="position RMSE [m] on validation paths")
     parser.add_argument("--out", type=Path, default=Path("runs/training.md"), help="file for the page")
     chosen = parser.parse_args(arguments)
+    check_can_be_made(chosen.out.with_suffix(""))
     task = read_settings(TaskSettings, "tasks", chosen.task)
     if task.environment != "track":
         raise ValueError(f"the goal is one of tracking, got a task of environment {task.environment!r}")
@@ -292,10 +301,11 @@ def main(arguments: list[str] | None = None) -> None:
         costs = {name: window_costs(task, one) for name, one in agents.items() if isinstance(one, SHACSettings)}
         courses = [train_timed(name, task, one, seed) for seed in chosen.seeds for name, one in agents.items()]
         rates = {name: (one, rate_on_tensors(task, one)) for name, one in on_tensors.items()}
+        beside = beside_others(task, ppo)
     given = sys.argv[1:] if arguments is None else arguments
     command = shlex.join(["python", "-m", "scripts.measure_training", *given])
     occasion = Occasion(command, chosen.turns, chosen.goal, (load, os.getloadavg()[0]))
-    write_page(chosen.out, Results(agents, measured, courses, costs, rates), occasion)
+    write_page(chosen.out, Results(agents, measured, courses, costs, rates, beside), occasion)
     print(chosen.out)
 
 

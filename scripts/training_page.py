@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from caster_gym.agents.agent_settings import LearnedSettings
 from caster_gym.agents.metrics import Verdict
 from caster_gym.agents.provenance import versions
-from caster_gym.agents.settings import LearnedSettings
 from caster_gym.papers.drawing import COLOURS, new_figure
 from scripts.mujoco_peer import paragraph
 from scripts.speed_page import processor, table
 from scripts.speed_timing import RATE, Ratio, Values, at_least, middle, shown, spread
+from scripts.training_busy import Beside, section
 
 OURS, FREE = "PPO on our robots", "PPO on robots that cost nothing"
 SHARE = Ratio("share of a zero-cost environment's speed", OURS, FREE, 100.0, at_least(95.0))
@@ -75,6 +76,7 @@ class Results(NamedTuple):
     courses: Sequence[Course]
     costs: Mapping[str, WindowCosts]
     rates: Mapping[str, tuple[LearnedSettings, float]]  # of learners on tensors [steps/s]
+    beside: Beside | None = None  # training with one thread and with two, beside busy processes
 
 
 class Occasion(NamedTuple):
@@ -124,6 +126,7 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
             table(("learner", "paths", "failed episodes", "position RMSE of the others, median"), _trials(results)),
         ]
     parts += ["## What limits each learner", _limits(results)]
+    parts += [section(results.beside)] if results.beside else []
     parts += ["## How it was measured", _origin(results, occasion, folder)]
     return "\n\n".join(parts) + "\n"
 
@@ -281,7 +284,8 @@ def _origin(results: Results, occasion: Occasion, folder: str) -> str:
     told = " and ".join(f"{name} {every}" for name, every in often.items())
     lines = [
         f"- Command: `{occasion.command}`",
-        "- Times are seconds of the processor, so that other work on the machine hardly counts; one thread",
+        "- Times are seconds of the processor, so that other work on the machine hardly counts, unless said otherwise; "
+        "one thread",
         "- A run's time begins before its robots and networks are made and ends with the validation that first meets "
         "the goal, validations left out",
     ]

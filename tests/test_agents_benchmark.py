@@ -1,6 +1,7 @@
 """caster_gym.agents.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
 
 import csv
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 import yaml
 from numpy.testing import assert_array_equal
 
+from caster_gym.agents import benchmark
+from caster_gym.agents.agent_settings import ComputedTorqueSettings, read_agent
 from caster_gym.agents.benchmark import (
     Contender,
     Job,
@@ -22,13 +25,7 @@ from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.computed_torque import ComputedTorque
 from caster_gym.agents.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.follow_metrics import FollowMetrics, FollowVerdict
-from caster_gym.agents.settings import (
-    BenchmarkSettings,
-    ComputedTorqueSettings,
-    TaskSettings,
-    read_agent,
-    read_settings,
-)
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, read_settings
 from caster_gym.agents.track_metrics import TrackMetrics, TrackVerdict, measure
 from caster_gym.agents.training_run import VALIDATION_SEED
 from caster_gym.configuration import ConfigurationError
@@ -185,6 +182,32 @@ def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
         train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
 
 
+@pytest.mark.parametrize(("threads", "processes"), [((), 5), ((1,), 5), ((4,), 4), ((64,), 1)])
+def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, threads, processes):
+    """Each training run has one thread or those asked for; cores only say how many run at a time."""
+    pools, submitted = [], []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, workers, mp_context):
+            pools.append(workers)
+            super().__init__(1)
+
+    monkeypatch.setattr(benchmark, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(benchmark, "usable_cores", lambda: 16)
+    monkeypatch.setattr(benchmark, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
+    agent = read_agent(settings.agents[1], {"steps": 512})
+    train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
+    assert pools == [processes]
+    assert submitted == 5 * [threads[0] if threads else 1]
+
+
+def test_run_yaml_has_the_threads_of_everybody(finished):
+    folder, _ = finished
+    files = [folder / "run.yaml", *(folder / "policies").rglob("run.yaml")]
+    assert len(files) == 1 + len(SEEDS)
+    assert all(yaml.safe_load(file.read_text(encoding="utf-8"))["threads"] == 1 for file in files)
+
+
 def test_no_jobs_are_no_work():
     train_all([])
 
@@ -231,5 +254,5 @@ def test_following_is_compared_in_the_same_way(tmp_path):
 def test_computed_torque_is_refused_where_actions_are_no_torques(task):
     commanded = TaskSettings.model_validate({**task.model_dump(), "wrappers": ["twist_commands"]})
     settings = ComputedTorqueSettings(algorithm="computed torque")
-    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* those of TwistCommands"):
+    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
         tune(settings, test_batch(commanded, commanded.validation, starts=1))

@@ -11,11 +11,11 @@ from safetensors.torch import load_file, save_file
 
 from caster_gym.agents import bundle as module
 from caster_gym.agents.actor import Actor
+from caster_gym.agents.agent_settings import PPOSettings, SACSettings
 from caster_gym.agents.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_bundle, save_bundle
 from caster_gym.agents.evaluation import roll_out
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.agents.sb3_learning import actor_of, make_learner
-from caster_gym.agents.settings import PPOSettings, SACSettings
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.follow_task import FollowTask
@@ -171,7 +171,7 @@ def test_python_tags_in_the_description_are_refused_and_run_nothing(tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"there is no file '.*nowhere.policy\.yaml'"):
+    with pytest.raises(ConfigurationError, match=r"there is no folder '.*nowhere' of a policy"):
         load_bundle(tmp_path / "nowhere")
     folder = saved(tmp_path)
     (folder / WEIGHTS).unlink()
@@ -292,9 +292,9 @@ def test_a_policy_is_refused_where_its_actions_mean_something_else():
     bundle = fresh_bundle(wrappers=(commands, lag))
     bundle.check_fits(LAYOUT, TASK.control_period, [commands])
     fresh_bundle().check_fits(LAYOUT, TASK.control_period, [lag])
-    with pytest.raises(ValueError, match=r"the policy's actions are TwistCommands\(.*\), the task takes torques"):
+    with pytest.raises(ValueError, match=r"the policy's actions are \{kind: twist_commands\}, the task takes torques"):
         bundle.check_fits(LAYOUT, TASK.control_period)
-    with pytest.raises(ValueError, match=r"the policy's actions are torques, the task takes TwistCommands\("):
+    with pytest.raises(ValueError, match=r"the policy's actions are torques, the task takes \{kind: twist_commands\}"):
         fresh_bundle().check_fits(LAYOUT, TASK.control_period, [commands])
 
 

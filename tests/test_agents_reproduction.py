@@ -72,7 +72,7 @@ def test_our_own_pages_are_replaced_only_if_told_to(papers, tmp_path):
 
 def test_a_file_is_no_folder(papers, tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(ValueError, match="file is a file; --out needs a folder"):
+    with pytest.raises(ValueError, match="file is not a folder; choose another --out"):
         reproduce("explained", tmp_path / "file", False, lambda *_: None)
 
 

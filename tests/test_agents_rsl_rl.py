@@ -10,9 +10,10 @@ import yaml
 from gymnasium.error import DependencyNotInstalled
 from rsl_rl.env import VecEnv
 
+from caster_gym.agents.agent_settings import RslPPOSettings, read_agent
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.rsl_rl import RslVecEnv, actor_of, make_runner
-from caster_gym.agents.settings import RslPPOSettings, TaskSettings, read_agent
+from caster_gym.agents.settings import TaskSettings
 from caster_gym.agents.training import train
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.torch_vector_env import TorchVectorEnv
@@ -122,7 +123,7 @@ def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
 def test_what_works_on_arrays_alone_is_refused(tmp_path):
     for kind in ("wrappers", "shaping"):
         feature = {"wrappers": "motor_lag", "shaping": "effort"}[kind]
-        with pytest.raises(ValueError, match=f"{kind} work on NumPy arrays, not on tensors: .* leave out '{feature}'"):
+        with pytest.raises(ValueError, match=f"'{kind}' of the task need NumPy arrays, .* leave out '{feature}'"):
             train(task(**{kind: [feature]}), SETTINGS, SEED, tmp_path, lambda steps, verdict: None, threads=1)
 
 
@@ -135,9 +136,9 @@ def test_a_device_that_is_not_there_is_named(tmp_path):
 def test_batches_must_be_whole():
     fields = {"algorithm": "rsl_ppo", "robots": 4, "horizon": 8}
     parse(RslPPOSettings, {**fields, "batch": 16}, "agent")
-    with pytest.raises(ConfigurationError, match=r"robots · horizon = 32 steps must be a multiple of the batch of 12"):
+    with pytest.raises(ConfigurationError, match=r"'batch' must divide robots · horizon = 32 steps, got 12: .* is 8$"):
         parse(RslPPOSettings, {**fields, "batch": 12}, "agent")
-    with pytest.raises(ConfigurationError, match=r"batch of 33 needs at most robots · horizon = 32 steps"):
+    with pytest.raises(ConfigurationError, match=r"'batch' must be at most robots · horizon = 32 steps, got 33"):
         parse(RslPPOSettings, {**fields, "batch": 33}, "agent")
 
 

@@ -7,19 +7,16 @@ import pytest
 import yaml
 from gymnasium.vector import AutoresetMode
 
-from caster_gym.agents.evaluation import bare, make_batch
-from caster_gym.agents.settings import (
+from caster_gym.agents.agent_settings import (
     AgentSettings,
-    BenchmarkSettings,
     ComputedTorqueSettings,
     LearnedSettings,
     PPOSettings,
     SACSettings,
-    TaskSettings,
-    find,
     read_agent,
-    read_settings,
 )
+from caster_gym.agents.evaluation import bare, make_batch
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, find, read_settings
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
@@ -109,14 +106,15 @@ def test_what_is_wrong_with_an_agent_is_named(tmp_path, content, message):
 
 def test_a_batch_must_fit_into_what_is_collected():
     PPOSettings(algorithm="ppo", robots=4, horizon=8, batch=32)
-    with pytest.raises(ConfigurationError, match=r"batch of 33 needs at most robots · horizon = 32 steps"):
+    with pytest.raises(ConfigurationError, match="'batch' must be at most robots · horizon = 32 steps, got 33"):
         parse(PPOSettings, {"algorithm": "ppo", "robots": 4, "horizon": 8, "batch": 33}, "ppo")
 
 
 @pytest.mark.parametrize(("kind", "other"), [("test", "train"), ("validation", "train"), ("test", "validation")])
 def test_held_out_paths_are_held_out(kind, other):
     shared = {"shape": "random_paths", "seed": 9, "count": 3}
-    with pytest.raises(ConfigurationError, match=f"a {kind} path must not be among the {other}.* seed=9"):
+    where = f"{{shape: random_paths, seed: 9}} as {kind} path 2 and as {other}(ing)? path 2; give one"
+    with pytest.raises(ConfigurationError, match=f"a {kind} path must not be among the {other}.*, got {where}"):
         parse(TaskSettings, {**PATHS, kind: [*PATHS[kind], shared], other: [*PATHS[other], shared]}, "task")
     parse(TaskSettings, {**PATHS, kind: [*PATHS[kind], shared]}, "task")
 
@@ -208,3 +206,39 @@ def test_a_path_is_taken_as_it_is(tmp_path):
     assert find("agents", str(tmp_path / "mine.yaml")) == tmp_path / "mine.yaml"
     with pytest.raises(ConfigurationError, match=r"there is no file '.*mine\.yaml'"):
         read_agent(str(tmp_path / "mine.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("agent", "wrong", "advised"),
+    [
+        ("ppo", {"robots": 4}, {"robots": 4, "batch": 512}),
+        ("ppo", {"robots": 4}, {"robots": 16}),
+        ("ppo", {"robots": 4}, {"robots": 4, "horizon": 512}),
+        ("ppo_gpu", {"batch": 1000}, {"batch": 512}),
+        ("shac", {"robots": 8}, {"robots": 8, "critic_batch": 128}),
+        ("shac", {"robots": 8}, {"robots": 8, "window": 32}),
+        ("sac", {"steps": 5000}, {"steps": 5000, "first_random": 4999}),
+    ],
+)
+def test_advice_on_settings_that_do_not_fit_together_helps(agent, wrong, advised):
+    """What is advised stands in the message, and is accepted."""
+    with pytest.raises(ConfigurationError) as caught:
+        read_agent(agent, wrong)
+    words = {"robots": "more robots", "horizon": "longer horizon", "window": "longer window", "steps": "steps in all"}
+    for key, value in advised.items():
+        if wrong.get(key) != value:
+            assert words.get(key, key) in str(caught.value)
+            assert key in words or key == "first_random" or str(value) in str(caught.value)
+    read_agent(agent, advised)
+
+
+def test_advice_on_held_out_paths_helps():
+    shared = {"shape": "random_paths", "seed": 0, "duration": 5.0}
+    with pytest.raises(ConfigurationError, match="give one of them another seed"):
+        parse(TaskSettings, {**PATHS, "train": [shared], "test": [shared]}, "task")
+    parse(TaskSettings, {**PATHS, "train": [shared], "test": [{**shared, "seed": 3}]}, "task")
+    points = {"shape": "spline", "waypoints": [[0.1 * i, 0.01 * i * i] for i in range(60)]}
+    with pytest.raises(ConfigurationError, match=r"waypoints: 60 points\} as test path 2 .* or leave it out") as caught:
+        parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}, points]}, "task")
+    assert len(str(caught.value)) < 300
+    parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}]}, "task")

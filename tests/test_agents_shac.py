@@ -6,8 +6,9 @@ import torch
 import yaml
 
 from caster_gym import load_robot
+from caster_gym.agents.agent_settings import SHACSettings, read_agent
 from caster_gym.agents.bundle import load_bundle
-from caster_gym.agents.settings import SHACSettings, TaskSettings, read_agent
+from caster_gym.agents.settings import TaskSettings
 from caster_gym.agents.shac import Critic, ShortHorizon, Window, frozen, make_task, td_lambda
 from caster_gym.agents.training import train
 from caster_gym.configuration import ConfigurationError, parse

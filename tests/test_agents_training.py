@@ -6,20 +6,28 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import caster_gym
 from caster_gym.agents import evaluation
+from caster_gym.agents.agent_settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings, read_agent
 from caster_gym.agents.bundle import load_bundle
 from caster_gym.agents.evaluation import roll_out
-from caster_gym.agents.settings import PPOSettings, SACSettings, TaskSettings, read_agent, read_settings
+from caster_gym.agents.settings import TaskSettings, read_settings
+from caster_gym.agents.threads import DEFAULT
 from caster_gym.agents.track_metrics import TrackVerdict, measure
 from caster_gym.agents.training import train
 from caster_gym.configuration import parse
+from caster_gym.engines.threads import get_threads
 
 HELD_OUT_SEED = 7
 TINY = {"hidden": (8,), "robots": 8, "batch": 64, "validations": 2}
 PPO = PPOSettings(algorithm="ppo", steps=2048, horizon=64, epochs=2, **TINY)
 SAC = SACSettings(algorithm="sac", steps=1600, updates=1, buffer=2000, first_random=200, **TINY)
+TENSORS = {"hidden": (8,), "robots": 4, "compile": False, "device": "cpu"}
+RSL_PPO = RslPPOSettings(algorithm="rsl_ppo", steps=32, horizon=4, batch=16, validations=2, **TENSORS)
+SHAC = SHACSettings(algorithm="shac", steps=24, window=2, critic_batch=8, validations=3, **TENSORS)
+LEARNERS = {"ppo": PPO, "sac": SAC, "rsl_ppo": RSL_PPO, "shac": SHAC}
 TASK = parse(
     TaskSettings,
     {
@@ -31,20 +39,12 @@ TASK = parse(
 )
 
 
-@pytest.fixture(autouse=True)
-def threads_as_before():
-    """Training sets the number of threads of the whole process."""
-    threads = torch.get_num_threads()
-    yield
-    torch.set_num_threads(threads)
-
-
 def nothing(steps, verdict):
     pass
 
 
-def run(folder, settings=PPO, seed=3, report=nothing):
-    return train(TASK, settings, seed, folder, report, threads=1)
+def run(folder, settings=PPO, seed=3, report=nothing, threads=DEFAULT):
+    return train(TASK, settings, seed, folder, report, threads)
 
 
 def rows(path):
@@ -109,6 +109,48 @@ def test_a_seed_repeats_to_the_last_bit_and_another_does_not(tmp_path, settings)
     assert [[row[name] for name in measured] for row in a] == [[row[name] for name in measured] for row in b]
 
 
+def recorded(folder, name):
+    """Values of TensorBoard by step."""
+    events = EventAccumulator(str(folder))
+    events.Reload()
+    return {event.step: event.value for event in events.Scalars(name)}
+
+
+@pytest.mark.parametrize("settings", LEARNERS.values(), ids=LEARNERS)
+def test_every_validation_is_recorded_at_its_own_step(tmp_path, settings):
+    """Also the last one, after which SB3 dumps nothing, and several between two of its dumps."""
+    best = run(tmp_path, settings)
+    history = rows(tmp_path / "validation.csv")
+    in_csv = [row for row in rows(tmp_path / "progress.csv") if row["validation/position_rmse"]]
+    for name in ("position_rmse", "failures", "seconds"):
+        validated = {int(row["steps"]): float(row[name]) for row in history}
+        assert {int(row["time/total_timesteps"]): float(row[f"validation/{name}"]) for row in in_csv} == validated
+        by_board = recorded(tmp_path, f"validation/{name}")
+        assert by_board == pytest.approx(validated, rel=1e-6)  # TensorBoard keeps single precision
+        assert {best.steps, max(validated)} <= by_board.keys()
+    assert len(in_csv) == len(history)
+    others = [row for row in rows(tmp_path / "progress.csv") if not row["validation/position_rmse"]]
+    assert others
+    assert all(int(row["time/total_timesteps"]) > 0 for row in others)
+
+
+@pytest.mark.parametrize("settings", LEARNERS.values(), ids=LEARNERS)
+@pytest.mark.parametrize("threads", [None, 2])
+def test_training_takes_one_thread_or_as_many_as_are_asked_for(tmp_path, settings, threads):
+    """Whatever the process has; run.yaml says how many, and afterwards they are as before."""
+    before, seen = (torch.get_num_threads(), get_threads()), set()
+    torch.set_num_threads(3)
+    try:
+        chosen = {} if threads is None else {"threads": threads}
+        run(tmp_path, settings, report=lambda *_: seen.add((torch.get_num_threads(), get_threads())), **chosen)
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before[0])
+    assert get_threads() == before[1]
+    assert seen == {(threads or 1, threads or 1)}
+    assert yaml.safe_load((tmp_path / "run.yaml").read_text(encoding="utf-8"))["threads"] == (threads or 1)
+
+
 def test_an_interruption_keeps_what_was_learned(tmp_path):
     def interrupt(steps, verdict):
         if steps >= PPO.steps // 4:
@@ -134,7 +176,7 @@ def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     """
     task = read_settings(TaskSettings, "tasks", "track")
     settings = read_agent("ppo", {"steps": 600_000, "validations": 3})
-    train(task, settings, 0, tmp_path, nothing, threads=1)
+    train(task, settings, 0, tmp_path, nothing)
     batch = evaluation.test_batch(task, task.test, starts=1)
     episodes = roll_out(load_bundle(tmp_path / "best").agent, batch, HELD_OUT_SEED)
     metrics = measure(episodes, 2.0)

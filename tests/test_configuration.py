@@ -179,7 +179,7 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({"walls": [{"ends": [0, "b"]}]}, "wall 1: number 2 of 'ends' should be a number, got 'b'"),
         ({"walls": [{"ends": [0]}]}, "wall 1: number 2 of 'ends' is missing"),
         ({"walls": [{"ends": [0, 1, 2]}]}, "wall 1: 'ends' should have at most 2 items, got 3"),
-        ({"walls": []}, "'walls' should have at least 1 items, got 0"),
+        ({"walls": []}, "'walls' should have at least 1 item, got 0"),
         ({"walls": [3]}, "wall 1 should be a mapping of keys to values, got 3"),
         ({"walls": 3}, "'walls' should be a list, got 3"),
         ({"things": [{"kind": "wall"}, {"kind": "pillar", "radius": 0}]}, "number 2 of 'things': 'radius' should be"),

@@ -1,6 +1,7 @@
 """scripts/measure_training.py and its page: free robots look like ours to PPO, and the page says what was measured."""
 
 import csv
+import subprocess
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import yaml
 
 from caster_gym.agents.evaluation import training_batch
 from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.sb3_learning import make_learner
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.agents.track_metrics import TrackVerdict
 from caster_gym.configuration import parse
@@ -24,6 +26,7 @@ from scripts.measure_training import (
     train_timed,
     window_costs,
 )
+from scripts.training_busy import Beside, Round, busy_processes, section, train_beside
 from scripts.training_page import Course, Occasion, Point, Results, Trial, WindowCosts, page
 
 PATH = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3, "count": 2}
@@ -71,6 +74,40 @@ def test_speeds_are_measured():
 
 def point(steps, seconds, error, failures=0):
     return Point(steps, seconds, TrackVerdict(error, 2.0 * error, 0.01, failures, 0.9))
+
+
+def test_training_is_measured_in_pairs_beside_busy_processes(monkeypatch):
+    """Each thread count as often as the other, and nothing is left running."""
+    started = []
+    popen = subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", lambda *one, **more: started.append(popen(*one, **more)) or started[-1])
+    settings = read_learner("ppo", {}).model_copy(update={"robots": 2, "horizon": 8, "batch": 8, "hidden": (4,)})
+    environment = CasterVecEnv(training_batch(TASK, 2))
+    beside = train_beside(make_learner(settings, environment, seed=0), periods=16, pairs=2)
+    assert sorted(one.threads for one in beside.rounds) == [1, 1, 2, 2]
+    assert {one.threads for one in beside.rounds[:2]} == {1, 2}
+    assert min(min(one.seconds, one.processor) for one in beside.rounds) > 0.0
+    assert len(started) == beside.processes
+    assert all(one.poll() is not None for one in started)
+
+
+def test_busy_processes_end_with_the_work():
+    with pytest.raises(ValueError, match="over"), busy_processes(1):
+        raise ValueError("over")
+
+
+def test_a_section_tells_what_a_second_thread_costs():
+    """Ratios pair by pair: 3, 4 and 5 times as long; 10, 20 and 30 times as much of the processor."""
+    rounds = [
+        Round(threads, seconds, processor)
+        for ratio, share in ((3.0, 10.0), (4.0, 20.0), (5.0, 30.0))
+        for threads, seconds, processor in ((1, 2.0, 1.0), (2, 2.0 * ratio, share))
+    ]
+    text = " ".join(section(Beside(rounds, periods=1000, processes=1)).split())
+    assert "beside 1 busy process, so that one core is left to it, in 3 pairs of rounds" in text
+    assert "takes 4 times as long by the clock and 20 times as much of the processor" in text
+    assert "| 1 | 500 steps/s | 1,000 µs |" in text
+    assert "| 2 | 125 steps/s | 20,000 µs |" in text
 
 
 def test_a_goal_is_met_without_failures_alone():
@@ -165,14 +202,17 @@ def test_learners_on_tensors_are_measured(monkeypatch):
         rate_on_tensors(TASK, read_learner("ppo", {}))
 
 
-def test_a_run_makes_a_page(tmp_path):
-    """A smoke test with a goal that everybody meets."""
+def test_a_run_makes_a_page(tmp_path, monkeypatch):
+    """A smoke test with a goal that everybody meets; what takes long beside busy processes is left out."""
+    rounds = [Round(1, 1.0, 1.0), Round(2, 2.0, 3.0)]
+    monkeypatch.setattr(measure_training, "train_beside", lambda learner, periods: Beside(rounds, periods, 1))
     (tmp_path / "task.yaml").write_text(yaml.safe_dump(CONTENT), encoding="utf-8")
     arguments = ["--task", str(tmp_path / "task.yaml"), "--agents", "ppo", "--tensors", "--seeds", "0"]
     main([*arguments, "--steps", "16384", "--turns", "1", "--goal", "10", "--out", str(tmp_path / "page.md")])
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
     assert "| ppo | 0 | 16,384 |" in text
     assert "(page/learning.png)" in text
+    assert "## Beside other processes" in text
     assert (tmp_path / "page" / "learning.png").stat().st_size > 10_000  # a picture with something in it
     with (tmp_path / "page" / "validations.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -184,6 +224,8 @@ def test_mistakes_are_named():
         main(["--agents", "computed_torque"])
     with pytest.raises(ValueError, match="the goal is one of tracking, got a task of environment 'follow'"):
         main(["--task", "follow"])
+    with pytest.raises(ValueError, match="results cannot be written to /proc/training"):
+        main(["--out", "/proc/training.md"])
 
 
 def test_failures_on_test_paths_are_told_for_each_kind():

@@ -111,6 +111,50 @@ def test_import_leaves_heavy_libraries_alone(installed, tmp_path, code):
     assert set(HEAVY) & set(loaded) == set()
 
 
+WITHOUT_TYPER = (
+    "import importlib.util, runpy, sys\n"
+    "find = importlib.util.find_spec\n"
+    "importlib.util.find_spec = lambda name, *rest: None if name == 'typer' else find(name, *rest)\n"
+    "sys.argv = ['caster-gym', *{arguments!r}]\n"
+    "runpy.run_module('caster_gym', run_name='__main__')\n"
+)
+
+
+@pytest.mark.parametrize("arguments", [[], ["train"], ["--help"]])
+def test_the_core_alone_says_which_extra_the_command_needs(installed, tmp_path, arguments):
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    result = subprocess.run(
+        [sys.executable, "-P", "-c", WITHOUT_TYPER.format(arguments=arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=environment,
+    )
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == (
+        "caster-gym: the command needs typer, which simulation does without: pip install 'caster_gym[train]'\n"
+    )
+
+
+def test_the_core_alone_knows_its_version(installed, tmp_path):
+    code = WITHOUT_TYPER.format(arguments=["--version"])
+    assert python(code, installed, tmp_path) == f"caster_gym {PROJECT['project']['version']}\n"
+
+
+def test_the_package_runs_as_the_command(installed, tmp_path):
+    code = "import runpy, sys\nsys.argv = ['x', '-h']\nrunpy.run_module('caster_gym', run_name='__main__')"
+    assert python(code, installed, tmp_path).startswith("Usage: caster-gym ")
+    module, function = PROJECT["project"]["scripts"]["caster-gym"].split(":")
+    assert (module, function) == ("caster_gym.__main__", "main")
+
+
+def test_dir_shows_the_public_names(installed, tmp_path):
+    names = python("import caster_gym\nprint(*dir(caster_gym))", installed, tmp_path).split()
+    assert [name for name in names if not name.startswith("_")] == ["Model", "Robot", "load_robot"]
+    assert "__version__" in names
+
+
 def test_environments_are_registered_by_the_import(installed, tmp_path):
     code = "import caster_gym, gymnasium\nprint(*(name for name in gymnasium.registry if name.startswith('Caster')))"
     assert "CasterTrack-v0" in python(code, installed, tmp_path).split()

@@ -1,6 +1,7 @@
 """What all tasks have in common: time, corridor, starts, obstacles and costs."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
@@ -10,6 +11,28 @@ from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 
 class Task(Frozen):
     """How a path is to be walked, and what that costs."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "dt": "control_period",
+        "control_dt": "control_period",
+        "timestep": "'control_period' is the time between actions [s], each of 'substeps' steps of the simulator",
+        "time_step": "'control_period' is the time between actions [s], each of 'substeps' steps of the simulator",
+        "control_freq": "give the time between actions instead: 'control_period' [s], its inverse",
+        "control_frequency": "give the time between actions instead: 'control_period' [s], its inverse",
+        "frame_skip": "substeps",
+        "decimation": "substeps",
+        "action_repeat": "substeps",
+        "max_episode_steps": "an episode is as long as its path: set the 'duration' or the 'laps' of that",
+        "max_steps": "an episode is as long as its path: set the 'duration' or the 'laps' of that",
+        "time_limit": "an episode is as long as its path: set the 'duration' or the 'laps' of that",
+        "seed": "give the seed to reset: env.reset(seed=0)",
+        "n_envs": "robots are counted by gymnasium.make_vec(…, num_envs=8)",
+        "horizon": "'preview' says how far ahead the observation looks",
+        "lookahead": "preview",
+        "obstacles": "obstacles stand in 'arena'",
+        "trajectory": "the path is given as 'path'",
+        "paths": "the path, or a list of them, is given as 'path'",
+    }
 
     control_period: Annotated[float, Field(ge=SHORTEST_PERIOD, le=1.0)] = 0.02  # [s] between actions
     substeps: Annotated[int, Field(gt=0, le=MOST_SUBSTEPS)] = 4  # RK4 steps in a control period

@@ -10,6 +10,7 @@ friction holds a joint that caster_gym lets creep: a comment in the model says h
 length is what the motor has turned, by the gear of its caster.
 """
 
+import math
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
@@ -29,10 +30,10 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
     Motors take torques [N m] within their greatest; that these fall with speed is left to who drives them. time_step in
     s; friction between wheels and floor. Raises ValueError for masses and inertias that no solid body can have.
     """
-    if not time_step > 0.0:
-        raise ValueError(f"time_step must be positive, got {time_step:g} s")
-    if not friction > 0.0:
-        raise ValueError(f"friction must be positive, got {friction:g}")
+    if not 0.0 < time_step < math.inf:
+        raise ValueError(f"time_step must be positive and finite, got {time_step:g} s")
+    if not 0.0 < friction < math.inf:
+        raise ValueError(f"friction must be positive and finite, got {friction:g}")
     for number, caster in enumerate(robot.casters, start=1):
         _check_solid(number, caster)
     casters = "".join(_caster_body(number, caster) for number, caster in enumerate(robot.casters, start=1))

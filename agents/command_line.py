@@ -1,0 +1,90 @@
+"""What all commands of caster-gym share: options, settings of the form KEY=VALUE, and errors in one sentence."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from gymnasium.error import DependencyNotInstalled
+from tqdm import tqdm
+
+from caster_gym.configuration import parse_yaml
+
+NOTHING_WRITTEN = "nothing was written"
+PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
+LONGEST_MESSAGE = 1000  # characters
+
+Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change a setting of the learned agents, e.g. --set steps=100000. May be repeated."),
+]
+TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
+Threads = Annotated[
+    int,
+    typer.Option(min=1, help="Threads of each process, for networks and simulation; results depend on their number."),
+]
+
+
+def changes_of(options: list[str] | None) -> dict[str, Any]:
+    """Settings from KEY=VALUE, values read as YAML."""
+    parsed: dict[str, Any] = {}
+    for option in options or []:
+        key, equals, value = option.partition("=")
+        if not equals or not key:
+            raise ValueError(f"--set needs KEY=VALUE, got {option!r}")
+        parsed[key] = parse_yaml(value, f"--set {option}")
+    return parsed
+
+
+@contextmanager
+def progress(**options: Any) -> Iterator[Callable[..., None]]:
+    """show(done, words) for a bar that appears when there is something to show, and not above a refusal."""
+    bars: list[tqdm[Any]] = []
+
+    def show(done: int, words: str = "") -> None:
+        if not bars:
+            bars.append(tqdm(**options))
+        bars[0].update(done - bars[0].n)
+        bars[0].set_postfix_str(words)
+
+    try:
+        yield show
+    finally:
+        for bar in bars:
+            bar.close()
+
+
+@contextmanager
+def plain_errors(interrupted: str = "what was finished is kept") -> Iterator[None]:
+    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C that says what is left."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename and error.strerror:  # else the message is a sentence already
+            refuse(f"{error.filename}: {error.strerror.lower()}", error)
+        refuse(str(error), error)
+    except (ValueError, DependencyNotInstalled) as error:
+        refuse(str(error), error)
+    except MemoryError as error:
+        refuse(f"there is not enough memory for this: {error or 'fewer robots or smaller batches need less'}", error)
+    except RuntimeError as error:
+        if "allocate" not in str(error):  # as Torch complains, with the place in its sources
+            raise
+        refuse("there is not enough memory for this: fewer robots, smaller batches or networks need less", error)
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("caster_gym"):
+            raise
+        refuse(f"this needs the Python package {error.name!r}: pip install 'caster_gym[train]'", error)
+    except KeyboardInterrupt:
+        typer.echo(f"caster-gym: interrupted; {interrupted}", err=True)
+        raise typer.Exit(130) from None
+
+
+def refuse(message: str, error: BaseException) -> NoReturn:
+    """End with a message on one line, and exit code 2."""
+    line = " ".join(message.split())
+    typer.echo(f"caster-gym: {line if len(line) <= LONGEST_MESSAGE else line[: LONGEST_MESSAGE - 1] + '…'}", err=True)
+    raise typer.Exit(2) from error

@@ -1,0 +1,32 @@
+"""The command caster-gym, also as `python -m caster_gym`: it needs more than simulation does."""
+
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+
+import caster_gym
+
+NEEDED = ("typer", "tqdm")  # of the extra `train`, whatever the command
+
+
+def main() -> None:
+    """Run the command line, or say what it lacks."""
+    if missing := [name for name in NEEDED if find_spec(name) is None]:
+        if sys.argv[1:] == ["--version"]:
+            print(f"caster_gym {caster_gym.__version__}")
+            return
+        sys.exit(_refuse(missing))
+    import_module("caster_gym.agents.cli").app(prog_name="caster-gym")
+
+
+def _refuse(missing: list[str]) -> int:
+    print(
+        f"caster-gym: the command needs {' and '.join(missing)}, which simulation does without: "
+        "pip install 'caster_gym[train]'",
+        file=sys.stderr,
+    )
+    return 2
+
+
+if __name__ == "__main__":
+    main()

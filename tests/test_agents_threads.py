@@ -1,0 +1,43 @@
+"""caster_gym.agents.threads: as many as are asked for, and no trace of it afterwards."""
+
+import os
+
+import pytest
+import torch
+
+from caster_gym.agents.threads import DEFAULT, limited_to, usable_cores
+from caster_gym.engines.threads import get_threads
+
+
+def used():
+    return torch.get_num_threads(), get_threads()
+
+
+@pytest.mark.parametrize("count", [DEFAULT, 3])
+def test_torch_and_the_simulator_take_so_many_and_then_as_before(count):
+    before = used()
+    with limited_to(count):
+        assert used() == (count, count)
+    assert used() == before
+
+
+def test_threads_are_as_before_after_an_error():
+    before = used()
+    with pytest.raises(KeyboardInterrupt), limited_to(before[0] + 1):
+        raise KeyboardInterrupt
+    assert used() == before
+
+
+@pytest.mark.parametrize("count", [0, -2])
+def test_fewer_than_one_are_refused(count):
+    before = used()
+    with pytest.raises(ValueError, match=f"must be 1 or more, got {count}"), limited_to(count):
+        pass
+    assert used() == before
+
+
+def test_cores_are_those_of_this_process(monkeypatch):
+    """Not of the machine: containers and schedulers leave fewer."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3, 5}, raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 64)
+    assert usable_cores() == 2
