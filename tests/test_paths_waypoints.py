@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
 from caster_gym.paths.splines import Spline
-from caster_gym.paths.waypoints import HEADING_UNITS, grid_step
 
 FULL = np.linspace(0.0, 2.0 * np.pi, 20001)
 
@@ -129,19 +128,6 @@ def test_a_tolerance_of_zero_leads_through_rounded_points():
     spline = Spline(waypoints=pairs(p), closed=True, tolerance=0.0)
     assert "smoothed" not in spline.description
     assert np.abs(spline.curve(np.array([0.0]))[0] - p[0]) < 1e-12
-
-
-@pytest.mark.parametrize(("values", "units", "step"), [
-    ([0.0, 0.3, 0.5], (1.0,), 0.1),
-    ([0.002, 0.004, 0.01], (1.0,), 0.002),
-    ([0.0254, 0.0508, 0.1016], (1.0,), 0.0254),
-    ([1.0, 1.0], (1.0,), 0.0),
-    ([0.1, np.pi, 0.77], (1.0,), 0.0),
-    (np.radians([10.0, 11.5, 13.0]), HEADING_UNITS, np.radians(1.5)),
-    (np.array([3, 7, 1003]) * np.pi / 2048.0, HEADING_UNITS, np.pi / 2048.0 * 4.0),
-])  # fmt: skip
-def test_a_grid_is_found_in_its_own_unit(values, units, step):
-    assert grid_step(np.asarray(values, dtype=float), units) == pytest.approx(step, rel=1e-4)  # 1.5° are 0.02618 rad
 
 
 # ---- Noise

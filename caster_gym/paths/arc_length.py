@@ -15,7 +15,7 @@ Values = TypeVar("Values", Array, Plane)
 
 LINE_COLUMNS = ("x", "y", "tx", "ty", "curvature", "cos", "sin", "bend", "bend_slope")
 MOST_ROW_TURN = 0.5  # [rad] of the tangent or the heading within one row: what lies between rows is interpolated
-_MOST_ROWS = 1_000_000  # so many would fill the memory: a line that needs more has a corner
+_MOST_ROWS = 100_000  # a line that needs more has a corner
 LEAST_ROWS = 5  # fewer do not show a way that is started and ended at rest
 _LIMIT_WAY = 1e-3  # [-] of the spacing: nearer to an end, at rest, quotients by the speed give way to their limits
 

@@ -18,8 +18,9 @@ COURSE_COLUMNS = (*LINE_COLUMNS, "square_speed")
 
 SPACING = 0.02  # [m] of rows, where the path allows it
 FINEST_SPACING = 0.001  # [m] finer rows would be many; no robot drives an arc of 2 mm
-_TRIES = 6  # of spacings, each of which suits the samples of the one before
+_TRIES = 3  # of spacings, each of which suits the samples of the one before
 _TIMED_STEP = 0.02  # [s] at which a path is tried as a trajectory: the period of the environments
+_MOST_FIRST_SAMPLES = 4_000  # a heading that still jumps turns on the spot
 _FEWEST_SAMPLES = 1000  # of a path's own trajectory, from which its line is made
 _STEP = 0.5  # [-] of the spacing: greatest way between them; a cubic of 1 cm errs by 0.01 µm at a radius of 15 cm
 
@@ -132,7 +133,8 @@ def _lines(specification: AnyPath, robot: Robot, spacing: float | None, free_hea
         advice = f"; {' or '.join(remedies)} would do" if remedies else ""
         timed = timed_remedy(specification, robot, _TIMED_STEP)
         if timed is not None:
-            advice += f"; CasterTrack drives it {f'with {timed}' if timed else 'as it is'}, timed by its 'duration'"
+            how = f"with {timed}" if timed else "as it is, in the time of its 'duration'"
+            advice += f"; CasterTrack drives it {how}"
         raise ValueError(f"{error}{advice}") from error
 
 
@@ -170,9 +172,9 @@ def _lines_as_they_are(specification: AnyPath, spacing: float | None, free_headi
                     lines.append(line_along(fine, tried, free_heading))
                     break
                 except CoarseSpacingError as error:
-                    if spacing is not None or error.spacing < FINEST_SPACING:
+                    if spacing is not None or tried == FINEST_SPACING:
                         raise
-                    tried = error.spacing
+                    tried = max(error.spacing, FINEST_SPACING)
             else:
                 raise NoLineError(f"it turns more sharply than rows of {FINEST_SPACING:g} m show")
     except ValueError as error:
@@ -182,10 +184,18 @@ def _lines_as_they_are(specification: AnyPath, spacing: float | None, free_headi
 
 def _sampled(specification: AnyPath, spacing: float) -> tuple[Trajectory, ...]:
     """Trajectories of a specification whose samples lie nearer to each other than rows of a line."""
-    trajectories = specification.trajectories(specification.duration / _FEWEST_SAMPLES)
+    samples = _FEWEST_SAMPLES
+    while True:
+        try:
+            trajectories = specification.trajectories(specification.duration / samples)
+            break
+        except ValueError:  # perhaps its heading turns too much within a sample
+            if samples >= _MOST_FIRST_SAMPLES:
+                raise
+            samples *= 4
     ways = max(float(np.hypot(*t.samples[:, 4:6].T).max()) * t.time_step for t in trajectories)
     if ways > _STEP * spacing:
-        samples = min(int(np.ceil(_FEWEST_SAMPLES * ways / (_STEP * spacing))), MOST_STEPS)
+        samples = min(int(np.ceil(samples * ways / (_STEP * spacing))), MOST_STEPS)
         trajectories = specification.trajectories(specification.duration / samples)
     return trajectories
 

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen
 from caster_gym.paths.naming import unknown_name
+from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 from caster_gym.paths.trajectory import Array, Plane
-from caster_gym.paths.waypoints import HEADING_UNITS, headings_note, rounding
 
 Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first three derivatives
 

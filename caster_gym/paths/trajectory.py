@@ -43,8 +43,7 @@ class Trajectory:
         if turn.max() > MOST_TURN:
             raise ValueError(
                 f"the heading of path {self.name!r} turns by {turn.max():.2g} rad in the time step after "
-                f"{turn.argmax() * self.time_step:.3g} s, more than {MOST_TURN:g} rad, as a tangent does where the "
-                f"path turns back on the spot"
+                f"{turn.argmax() * self.time_step:.3g} s, more than {MOST_TURN:g} rad"
             )
         samples.flags.writeable = False
         object.__setattr__(self, "samples", samples)

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.paths.rounding import HEADING_UNITS, headings_note, is_coarse, rounding, zigzag
 from caster_gym.paths.trajectory import Array
 
 Turns = Literal["auto", "nearest", "as_written"]
@@ -19,15 +20,6 @@ _JITTER = 0.05  # [-] of the spacings on both sides: a step that is shorter and 
 _SIDEWAYS = 0.5**0.5  # cosine of the angle from which on a step leads elsewhere
 _NEAR_END = 2e-3  # [m] a closed path whose last waypoint is nearer to its first repeats it
 _GROUP = 3.0  # [-] of the tolerance: waypoints this near to the first of them are seen as one place, at their mean
-_FEWEST = 30  # fewer waypoints do not show that they were rounded: people type round numbers
-_FINE = 0.01  # [-] of the extent: a coarser grid is not taken for rounding, unless neighbours fall together on it
-_COARSE = 0.1  # [-] of the extent: nothing is told of a coarser grid
-_TOGETHER = 0.1  # [-] share of rows that repeat the row before them, by which a coarse grid shows itself
-_MATTERS = 0.1  # [-] of the extent: step · n² beyond, rounding changes the second derivative by about 2 %
-_GRID_SLACK = 0.02  # [-] of a grid's step: numbers that miss it by more do not lie on it
-_FINEST_DIGIT = 9
-_ROUNDED = 1.0 / 12.0**0.5  # root mean square error of numbers that were rounded to a step of 1
-HEADING_UNITS = (1.0, np.pi / 180.0, np.pi / 32768.0)  # [rad] radians, degrees, ticks of encoders
 _LEAST_SPOT_TURN = 1e-6  # [rad] on exact waypoints
 _LEAST_NOISY_SPOT_TURN = 0.5  # [rad] on rounded or noisy ones, which may stay at a place for some rows on their way
 
@@ -80,7 +72,9 @@ def read_track(
     if allowed > 0.0:
         why = f"as they are rounded to {step:g} m" if tolerance is None else "as its tolerance allows"
         notes.insert(0, f"smoothed, at {allowed:.2g} m from the waypoints (root mean square), {why}")
-    elif tolerance is None and _is_coarse(rows[:, :2]):
+    elif tolerance is None and (noise := zigzag(rows[:, :2])) > 0.0:
+        notes.insert(0, f"its waypoints zigzag by about {noise:.1g} m: a tolerance of that would smooth it")
+    elif tolerance is None and is_coarse(rows[:, :2]):
         notes.insert(0, "led through waypoints on a coarse grid; if that is rounding, a tolerance would smooth it")
     if turn_allowed > 0.0:
         notes.append(headings_note(turn_allowed, turn_step if heading_tolerance is None else None))
@@ -119,51 +113,6 @@ def _wraps_at_full_turns(headings: Array, nearest: Array) -> bool:
         if not any(step * taken[i] > 0.0 and abs(taken[i]) <= 2.5 * abs(step) for step in beside):
             return False
     return True
-
-
-def grid_step(values: Array, units: Sequence[float] = (1.0,)) -> float:
-    """Step of the coarsest grid, decimal in one of the units, on which values (n,) lie from the first; 0 if on none."""
-    away = values - values[0]
-    if not away.any():
-        return 0.0
-    for unit in units:
-        for digits in range(_FINEST_DIGIT + 1):
-            scaled = away / unit * 10.0**digits
-            whole = np.rint(scaled)
-            if whole.any() and np.abs(scaled - whole).max() <= _GRID_SLACK and np.abs(whole).max() < 2**52:
-                return float(np.gcd.reduce(whole.astype(np.int64))) / 10.0**digits * unit
-    if np.array_equal(values, values.astype(np.float32)):
-        return float(np.spacing(np.float32(np.abs(values).max())))
-    return 0.0
-
-
-def rounding(columns: Array, units: Sequence[float] = (1.0,)) -> tuple[float, float]:
-    """Root mean square error of rows (n, d) that were rounded, and the step; zeros where it would not bend a curve."""
-    steps = np.array([grid_step(column, units) for column in columns.T])
-    step, extent = float(steps.max()), float(np.ptp(columns, axis=0).max())
-    if not _matters(step, len(columns), extent) or (step > _FINE * extent and not _falls_together(columns)):
-        return 0.0, 0.0
-    return _ROUNDED * float(np.hypot.reduce(steps)), step
-
-
-def headings_note(tolerance: float, step: float | None) -> str:
-    """What to tell of headings that are smoothed within a tolerance [rad]; step [rad]: because of their rounding."""
-    why = "as their tolerance allows" if step is None else f"as they are rounded to {step:.3g} rad"
-    return f"headings smoothed, at {tolerance:.2g} rad from those given (root mean square), {why}"
-
-
-def _matters(step: float, count: int, extent: float) -> bool:
-    """Does rounding to a step bend a curve through so many points of such an extent, and are they not typed?"""
-    return count >= _FEWEST and step <= _COARSE * extent and step * count**2 > _MATTERS * extent
-
-
-def _falls_together(columns: Array) -> bool:
-    return float((np.diff(columns, axis=0) == 0.0).all(axis=1).mean()) >= _TOGETHER
-
-
-def _is_coarse(points: Array) -> bool:
-    step = max(grid_step(column) for column in points.T)
-    return _matters(step, len(points), float(np.ptp(points, axis=0).max()))
 
 
 def _without_repeated_start(rows: Array) -> tuple[Array, float, str]:
