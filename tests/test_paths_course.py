@@ -95,8 +95,58 @@ def test_samples_are_read_only():
 def test_a_path_that_makes_no_course_is_named():
     with pytest.raises(ValueError, match=r"path 'random_paths \d+' makes no course: it turns back on the spot at s ="):
         build_courses({"shape": "random_paths", "count": 20}, ROBOT, 1.0)
-    with pytest.raises(ValueError, match=r"path 'circle' makes no course: it is 0\.0628 m long"):
-        build_courses({"shape": "circle", "radius": 0.01}, ROBOT, 1.0)
+    with pytest.raises(ValueError, match=r"path 'circle' makes no course: it is 0\.00314 m long"):
+        build_courses({"shape": "circle", "radius": 5e-4}, ROBOT, 1.0)
+
+
+@pytest.mark.parametrize("radius", [0.002, 0.01, 0.03])
+def test_rows_are_finer_where_a_path_turns_sharply(radius):
+    """At most 0.5 rad within a row; the curvature is that of the circle."""
+    (course,) = build_courses({"shape": "circle", "radius": radius}, ROBOT, 1.0)
+    assert course.spacing <= 0.5 * radius * (1.0 + 1e-6)
+    assert course.length == pytest.approx(2.0 * np.pi * radius, rel=1e-6)
+    assert_allclose(course.samples[:, 4], 1.0 / radius, rtol=1e-5)
+
+
+def test_a_corner_of_waypoints_makes_a_course():
+    """Points 10 cm apart around a corner, as people type them."""
+    points = [(0.1 * i, 0.0) for i in range(11)] + [(1.0, 0.1 * i) for i in range(1, 11)]
+    (course,) = build_courses({"shape": "spline", "waypoints": points}, ROBOT, 1.0)
+    assert 0.01 < course.spacing < 0.02
+    assert course.length == pytest.approx(2.0, abs=0.02)
+
+
+def test_paths_that_do_not_turn_sharply_keep_their_rows_beside_one_that_does():
+    tight, _ = build_courses(["lemniscate", {"shape": "circle", "radius": 0.01}], ROBOT, 1.0)
+    (alone,) = build_courses("lemniscate", ROBOT, 1.0)
+    assert tight.spacing == alone.spacing
+    assert_array_equal(tight.samples[:, :9], alone.samples[:, :9])
+
+
+@pytest.mark.parametrize("decimals", [2, 3, 4])
+def test_a_recorded_path_is_driven_as_fast_as_the_curve_that_was_recorded(decimals):
+    """400 points on an ellipse of 6 m, rounded, against 40 exact ones."""
+
+    def duration(count, digits):
+        t = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        points = np.column_stack([1.2 * np.cos(t), 0.7 * np.sin(t)]).round(digits)
+        (course,) = build_courses({"shape": "spline", "waypoints": points.tolist(), "closed": True}, ROBOT, 1.0)
+        return course.duration
+
+    assert duration(400, decimals) == pytest.approx(duration(40, 15), rel=0.03)
+
+
+def test_a_free_heading_passes_turns_on_the_spot():
+    turning = {"shape": "spline", "waypoints": [(0, 0, 0.3), (1, 0, 0.3), (1, 0, 2.0), (1, 1, 2.0)]}
+    (course,) = build_courses(turning, ROBOT, 1.0, free_heading=True)
+    assert_allclose(course.samples[:, 5:7], [[np.cos(0.3), np.sin(0.3)]] * len(course.samples), atol=1e-12)
+
+
+def test_the_description_of_a_path_comes_with_its_course():
+    t = np.linspace(0.0, 2.0, 60)
+    path = {"shape": "spline", "waypoints": np.column_stack([t, np.sin(t)]).round(3).tolist()}
+    (course,) = build_courses(path, ROBOT, 1.0)
+    assert "rounded to 0.001 m" in course.description
 
 
 @pytest.mark.parametrize(

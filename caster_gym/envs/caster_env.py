@@ -23,6 +23,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def __init__(self, engine: TaskEngine, task: Task, render_mode: str | None) -> None:
         self.engine, self.task, self.robot = engine, task, engine.robot
+        self.path_descriptions = engine.plan.descriptions  # what was made of each path of the pool
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
         self._action_shape = self.action_space.shape

@@ -40,6 +40,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         super().__init__()
         self.num_envs = engine.count
         self.engine, self.task, self.robot = engine, task, engine.robot
+        self.path_descriptions = engine.plan.descriptions  # what was made of each path of the pool
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.render_mode = checked_mode(render_mode, self.metadata)
         self.metadata = {

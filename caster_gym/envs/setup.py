@@ -95,7 +95,8 @@ def _track_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: Tr
         return f"at {k * task.control_period:.2f} s"
 
     around, arenas = _arenas(arena, robot, names, poses, task, moment)
-    return Plan(guide, names, tables, Terms._fields, around, arenas)
+    descriptions = tuple(trajectory.description or trajectory.name for trajectory in trajectories)
+    return Plan(guide, names, tables, Terms._fields, around, arenas, descriptions)
 
 
 @lru_cache(maxsize=32)
@@ -124,7 +125,8 @@ def _follow_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: F
         return f"after {k * courses[i].spacing:.2f} m"
 
     around, arenas = _arenas(arena, robot, names, poses, task, arc)
-    return Plan(guide, names, tables, FollowTerms._fields, around, arenas)
+    descriptions = tuple(course.description or course.name for course in courses)
+    return Plan(guide, names, tables, FollowTerms._fields, around, arenas, descriptions)
 
 
 def _arenas(

@@ -69,6 +69,7 @@ class Plan(NamedTuple):
     terms: tuple[str, ...]  # names of the reward's terms
     around: Surroundings
     arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
+    descriptions: tuple[str, ...]  # what was made of each path
 
 
 class Pace(NamedTuple):

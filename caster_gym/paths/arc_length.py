@@ -9,12 +9,13 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from caster_gym.paths.trajectory import Array, Plane, Trajectory
+from caster_gym.paths.trajectory import Array, Plane, Trajectory, rounded_down
 
 Values = TypeVar("Values", Array, Plane)
 
 LINE_COLUMNS = ("x", "y", "tx", "ty", "curvature", "cos", "sin", "bend", "bend_slope")
 MOST_ROW_TURN = 0.5  # [rad] of the tangent or the heading within one row: what lies between rows is interpolated
+_MOST_ROWS = 100_000  # a line that needs more has a corner
 LEAST_ROWS = 5  # fewer do not show a way that is started and ended at rest
 _LIMIT_WAY = 1e-3  # [-] of the spacing: nearer to an end, at rest, quotients by the speed give way to their limits
 
@@ -29,6 +30,7 @@ class Line(NamedTuple):
     name: str
     spacing: float  # [m]
     rows: Array
+    description: str = ""  # what was made of the path
 
 
 class _Nodes(NamedTuple):
@@ -43,10 +45,23 @@ class _Nodes(NamedTuple):
     bend_slope: Array
 
 
+class NoLineError(ValueError):
+    """A path that stands still, stops or turns back on its way: its arc length does not tell where it is."""
+
+
+class CoarseSpacingError(ValueError):
+    """A path that is too short or turns too sharply for a spacing."""
+
+    def __init__(self, what: str, spacing: float) -> None:
+        super().__init__(f"{what}; a spacing of {spacing:g} m would do")
+        self.what, self.spacing = what, spacing  # [m] one that would do
+
+
 def line_along(trajectory: Trajectory, spacing: float, free_heading: bool) -> Line:
     """The line of a trajectory that rests at its ends only; its spacing [m] is changed so that it divides the length.
 
-    A free heading stays what it is at the start. Raises ValueError that says where the path turns too sharply.
+    A free heading stays what it is at the start. Raises NoLineError, and CoarseSpacingError that says where the path
+    turns too sharply.
     """
     nodes = _nodes(trajectory, spacing)
     if free_heading:
@@ -55,19 +70,17 @@ def line_along(trajectory: Trajectory, spacing: float, free_heading: bool) -> Li
     length = float(nodes.s[-1])
     count = round(length / spacing)
     if count < LEAST_ROWS:
-        raise ValueError(
-            f"it is {length:.3g} m long, less than {LEAST_ROWS} rows of {spacing:g} m; "
-            f"a spacing of {length / LEAST_ROWS:.2g} m would do"
-        )
+        what = f"it is {length:.3g} m long, less than {LEAST_ROWS} rows of {spacing:g} m"
+        raise CoarseSpacingError(what, _finer(nodes, LEAST_ROWS))
+    _refuse_sharp_turns(nodes, count)
     s = np.linspace(0.0, length, count + 1)
-    _refuse_sharp_turns(nodes, s)
     tangent = _unit(hermite(nodes.s, nodes.tangent, 1j * nodes.curvature * nodes.tangent, s))
     heading = _unit(hermite(nodes.s, nodes.heading, 1j * nodes.bend * nodes.heading, s))
     point = hermite(nodes.s, nodes.point, nodes.tangent, s)
     curvature, bend, slope = (np.interp(s, nodes.s, c) for c in (nodes.curvature, nodes.bend, nodes.bend_slope))
     slope[0], slope[-1] = _first_slope(bend[:3], s[1]), _first_slope(bend[:-4:-1], -s[1])
     columns = (point.real, point.imag, tangent.real, tangent.imag, curvature, heading.real, heading.imag, bend, slope)
-    return Line(trajectory.name, length / count, np.stack(columns, axis=1))
+    return Line(trajectory.name, length / count, np.stack(columns, axis=1), trajectory.description)
 
 
 def between(rows: Array, spacing: Array | float, share: Array | float, first: Array | slice) -> Array:
@@ -104,16 +117,13 @@ def _nodes(trajectory: Trajectory, spacing: float) -> _Nodes:
     t, h = trajectory.samples, trajectory.time_step
     p, heading, v, a = (t[:, i] + 1j * t[:, i + 1] for i in (0, 2, 4, 7))
     speed = np.abs(v)
-    back = (v[1:-2].conj() * v[2:-1]).real <= 0.0
-    if back.any():
-        place = _where(_ways(speed, 0.0 * speed, h), p, int(back.argmax()) + 1)
-        raise ValueError(f"it turns back on the spot {place}; a wider turn would do, for random paths a reversing of 0")
+    _refuse_rest(t, h)
     rate = np.zeros_like(speed)
     rate[1:-1] = (v.conj() * a).real[1:-1] / speed[1:-1]
     s = _ways(speed, rate, h)
     inside = (s > _LIMIT_WAY * spacing) & (s < s[-1] - _LIMIT_WAY * spacing)
     if inside.sum() < 2:
-        raise ValueError(f"it is {s[-1]:.3g} m long, too short for a spacing of {spacing:g} m")
+        raise NoLineError(f"it is only {s[-1]:.3g} m long")
     v, a, speed, rate = v[inside], a[inside], speed[inside], rate[inside]
     tangent = v / speed
     curvature = (v.conj() * a).imag / speed**3
@@ -150,19 +160,52 @@ def _first_slope(values: Array, h: float) -> float:
     return float((4.0 * values[1] - 3.0 * values[0] - values[2]) / (2.0 * h))
 
 
-def _refuse_sharp_turns(nodes: _Nodes, s: Array) -> None:
+def _refuse_rest(samples: Array, h: float) -> None:
+    """Refuse samples (K + 1, 10) at time steps h [s] that stop anywhere but at their ends."""
+    p, v = samples[:, 0] + 1j * samples[:, 1], samples[:, 4] + 1j * samples[:, 5]
+    speed = np.abs(v)
+    if not speed.any():
+        raise NoLineError(f"it {'turns on the spot' if samples[:, 6].any() else 'stands still'} and leads nowhere")
+    back = (v[1:-2].conj() * v[2:-1]).real <= 0.0
+    if not back.any():
+        return
+    k = int(back.argmax()) + 1
+    place = _where(_ways(speed, 0.0 * speed, h), p, k)
+    if speed[k] == 0.0 or speed[k + 1] == 0.0:
+        still = np.flatnonzero(speed[k + 1 :])
+        rest = samples[k : k + 1 + (int(still[0]) if len(still) else len(samples)), 6]
+        raise NoLineError(f"it {'turns on the spot' if np.abs(rest).any() else 'stops'} {place}")
+    raise NoLineError(f"it turns back on the spot {place}")
+
+
+def _turns(direction: Plane, nodes: _Nodes, count: int) -> Array:
+    """Turn (count,) of a direction within each of so many equal rows. [rad]"""
+    turned = np.concatenate([[0.0], np.cumsum(np.abs(np.angle(direction[1:] / direction[:-1])))])
+    return np.diff(np.interp(np.linspace(0.0, nodes.s[-1], count + 1), nodes.s, turned))
+
+
+def _refuse_sharp_turns(nodes: _Nodes, count: int) -> None:
+    """Refuse a line that turns too much within one of so many equal rows."""
+    row = nodes.s[-1] / count
     for what, direction in (("tangent", nodes.tangent), ("heading", nodes.heading)):
-        turned = np.concatenate([[0.0], np.cumsum(np.abs(np.angle(direction[1:] / direction[:-1])))])
-        turn = np.diff(np.interp(s, nodes.s, turned))
+        turn = _turns(direction, nodes, count)
         k = int(turn.argmax())
         if turn[k] > MOST_ROW_TURN:
-            place = _where(nodes.s, nodes.point, int(np.searchsorted(nodes.s, 0.5 * (s[k] + s[k + 1]))))
-            finer = s[1] * MOST_ROW_TURN / turn[k]
-            raise ValueError(
-                f"its {what} turns by {turn[k]:.2g} rad within {s[1]:.3g} m {place}, more than {MOST_ROW_TURN:g} rad; "
-                f"a spacing of {finer:.1g} m would do, a wider turn (for random paths a min_radius)"
-                f"{', or a free heading' if what == 'heading' else ''}"
-            )
+            place = _where(nodes.s, nodes.point, int(np.searchsorted(nodes.s, (k + 0.5) * row)))
+            sharp = f"its {what} turns by {turn[k]:.2g} rad within {row:.3g} m {place}, more than {MOST_ROW_TURN:g} rad"
+            raise CoarseSpacingError(sharp, _finer(nodes, count))
+
+
+def _finer(nodes: _Nodes, count: int) -> float:
+    """A spacing [m], to two digits, of at least so many rows that each turn little."""
+    length = float(nodes.s[-1])
+    while True:
+        spacing = rounded_down(length / count)
+        rows = round(length / spacing)
+        turn = max(float(_turns(direction, nodes, rows).max()) for direction in (nodes.tangent, nodes.heading))
+        if turn <= MOST_ROW_TURN or rows > _MOST_ROWS:
+            return spacing
+        count = int(np.ceil(rows * max(1.02, min(turn / MOST_ROW_TURN, 2.0)))) + 1
 
 
 def _where(s: Array, point: Plane, k: int) -> str:

@@ -6,14 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from caster_gym.paths.arc_length import LINE_COLUMNS, Line, between, line_along
+from caster_gym.paths.advice import timed_remedy
+from caster_gym.paths.arc_length import LINE_COLUMNS, CoarseSpacingError, Line, NoLineError, between, line_along
 from caster_gym.paths.specification import AnyPath, named_apart, read_paths
+from caster_gym.paths.splines import Spline
 from caster_gym.paths.time_law import fastest_laws, row_times
 from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory, check_time_step, tabulate
 from caster_gym.robot import Robot
 
 COURSE_COLUMNS = (*LINE_COLUMNS, "square_speed")
 
+SPACING = 0.02  # [m] of rows, where the path allows it
+FINEST_SPACING = 0.001  # [m] finer rows would be many; no robot drives an arc of 2 mm
+_TRIES = 3  # of spacings, each of which suits the samples of the one before
+_TIMED_STEP = 0.02  # [s] at which a path is tried as a trajectory: the period of the environments
+_MOST_FIRST_SAMPLES = 4_000  # a heading that still jumps turns on the spot
 _FEWEST_SAMPLES = 1000  # of a path's own trajectory, from which its line is made
 _STEP = 0.5  # [-] of the spacing: greatest way between them; a cubic of 1 cm errs by 0.01 µm at a radius of 15 cm
 
@@ -31,6 +38,7 @@ class Course:
     name: str
     spacing: float  # [m]
     samples: Array
+    description: str = ""  # what was made of the path, as far as that does not stand in it
 
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)
@@ -82,50 +90,114 @@ def build_courses(
     robot: Robot,
     speed_limit: float,
     free_heading: bool = False,
-    spacing: float = 0.02,
+    spacing: float | None = None,
     margin: float = 0.8,
 ) -> tuple[Course, ...]:
     """The courses of all paths; how long the paths themselves take does not matter.
 
     speed_limit [m/s] of C along the path. free_heading: the heading stays what it is at the start. spacing [m] between
-    rows, changed a little so that it divides each length. margin: share of the motors' torque and speed that the law
-    may use.
+    rows, changed a little so that it divides each length; None: 2 cm, or finer, down to 1 mm, for a path that turns
+    too sharply or is too short for that. margin: share of the motors' torque and speed that the law may use.
 
-    Raises ValueError for a path that is too short, turns back on the spot or too sharply for the spacing, or along
-    which the robot cannot move; the message says where, and what would do.
+    Raises ValueError for a path that stands still, stops or turns back on its way, turns too sharply for the spacing,
+    or along which the robot cannot move; the message says where, and what would do.
     """
     _check_positive("speed_limit", speed_limit, "m/s")
-    _check_positive("spacing", spacing, "m")
+    if spacing is not None:
+        _check_positive("spacing", spacing, "m")
     if not 0.0 < margin <= 1.0:
         raise ValueError(f"margin must be above 0 and at most 1, got {margin:g}")
     lines: list[Line] = []
     for specification in read_paths(path):
-        lines.extend(_lines(specification, spacing, free_heading))
+        lines.extend(_lines(specification, robot, spacing, free_heading))
     names = named_apart([line.name for line in lines])
     lines = [line._replace(name=name) for line, name in zip(lines, names, strict=True)]
     laws = fastest_laws(lines, robot, speed_limit, margin)
     return tuple(
-        Course(line.name, line.spacing, np.column_stack([line.rows, law]))
+        Course(line.name, line.spacing, np.column_stack([line.rows, law]), line.description)
         for line, law in zip(lines, laws, strict=True)
     )
 
 
-def _lines(specification: AnyPath, spacing: float, free_heading: bool) -> list[Line]:
-    """The lines of one specification, from trajectories that are sampled finely enough."""
+def _lines(specification: AnyPath, robot: Robot, spacing: float | None, free_heading: bool) -> list[Line]:
+    """The lines of one specification; ValueError says what would make one that there is none of."""
+    try:
+        return _lines_as_they_are(specification, spacing, free_heading)
+    except _RefusedError as error:
+        coarse = isinstance(error.reason, CoarseSpacingError)
+        if coarse and spacing is not None:
+            raise ValueError(str(error)) from error
+        remedies = [] if free_heading or not _makes_lines(specification, True) else ["a free heading"]
+        wider = next((words for one, words in specification.wider() if _makes_lines(one, free_heading)), None)
+        remedies += [wider] if wider else []
+        advice = f"; {' or '.join(remedies)} would do" if remedies else ""
+        timed = timed_remedy(specification, robot, _TIMED_STEP)
+        if timed is not None:
+            how = f"with {timed}" if timed else "as it is, in the time of its 'duration'"
+            advice += f"; CasterTrack drives it {how}"
+        raise ValueError(f"{error}{advice}") from error
+
+
+class _RefusedError(ValueError):
+    """Why a path makes no course."""
+
+    def __init__(self, name: str, reason: ValueError, free_of_spacing: bool) -> None:
+        what = reason.what if free_of_spacing and isinstance(reason, CoarseSpacingError) else str(reason)
+        super().__init__(f"path {name!r} makes no course: {what}")
+        self.reason = reason
+
+
+def _makes_lines(specification: AnyPath, free_heading: bool) -> bool:
+    try:
+        return bool(_lines_as_they_are(specification, None, free_heading))
+    except ValueError:
+        return False
+
+
+def _lines_as_they_are(specification: AnyPath, spacing: float | None, free_heading: bool) -> list[Line]:
+    """The lines of one specification, from trajectories that are sampled finely enough; spacing None: one that does."""
+    if free_heading and isinstance(specification, Spline):
+        specification = specification.without_headings()
+    coarse = SPACING if spacing is None else spacing
+    lines: list[Line] = []
     name: str = specification.shape
     try:
-        trajectories = specification.trajectories(specification.duration / _FEWEST_SAMPLES)
-        ways = max(float(np.hypot(*t.samples[:, 4:6].T).max()) * t.time_step for t in trajectories)
-        if ways > _STEP * spacing:
-            samples = min(int(np.ceil(_FEWEST_SAMPLES * ways / (_STEP * spacing))), MOST_STEPS)
-            trajectories = specification.trajectories(specification.duration / samples)
-        lines = []
-        for trajectory in trajectories:
+        trajectories = _sampled(specification, coarse)
+        for k, trajectory in enumerate(trajectories):
             name = trajectory.name
-            lines.append(line_along(trajectory, spacing, free_heading))
+            tried = coarse
+            for _ in range(_TRIES):
+                try:
+                    fine = trajectory if tried == coarse else _sampled(specification, tried)[k]
+                    lines.append(line_along(fine, tried, free_heading))
+                    break
+                except CoarseSpacingError as error:
+                    if spacing is not None or tried == FINEST_SPACING:
+                        raise
+                    tried = max(error.spacing, FINEST_SPACING)
+            else:
+                raise NoLineError(f"it turns more sharply than rows of {FINEST_SPACING:g} m show")
     except ValueError as error:
-        raise ValueError(f"path {name!r} makes no course: {error}") from error
+        raise _RefusedError(name, error, spacing is None) from error
     return lines
+
+
+def _sampled(specification: AnyPath, spacing: float) -> tuple[Trajectory, ...]:
+    """Trajectories of a specification whose samples lie nearer to each other than rows of a line."""
+    samples = _FEWEST_SAMPLES
+    while True:
+        try:
+            trajectories = specification.trajectories(specification.duration / samples)
+            break
+        except ValueError:  # perhaps its heading turns too much within a sample
+            if samples >= _MOST_FIRST_SAMPLES:
+                raise
+            samples *= 4
+    ways = max(float(np.hypot(*t.samples[:, 4:6].T).max()) * t.time_step for t in trajectories)
+    if ways > _STEP * spacing:
+        samples = min(int(np.ceil(samples * ways / (_STEP * spacing))), MOST_STEPS)
+        trajectories = specification.trajectories(specification.duration / samples)
+    return trajectories
 
 
 def _check_positive(name: str, value: float, unit: str) -> None:

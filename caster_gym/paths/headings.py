@@ -5,16 +5,26 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen
 from caster_gym.paths.naming import unknown_name
+from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 from caster_gym.paths.trajectory import Array, Plane
 
 Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first three derivatives
 
 
-class Tangent(Frozen):
+class _Kind(Frozen):
+    """What all kinds of headings share."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was made of the numbers, in words."""
+        return ()
+
+
+class Tangent(_Kind):
     """Along the path."""
 
     kind: Literal["tangent"] = "tangent"
@@ -31,7 +41,7 @@ class Tangent(Frozen):
             return np.angle(first) + self.offset, bend.imag, (third / first - bend**2).imag
 
 
-class Fixed(Frozen):
+class Fixed(_Kind):
     """At one angle."""
 
     kind: Literal["fixed"] = "fixed"
@@ -42,7 +52,7 @@ class Fixed(Frozen):
         return np.full_like(share, self.angle), np.zeros_like(share), np.zeros_like(share)
 
 
-class Spinning(Frozen):
+class Spinning(_Kind):
     """Turning in proportion to the progress."""
 
     kind: Literal["spinning"] = "spinning"
@@ -55,12 +65,15 @@ class Spinning(Frozen):
         return self.angle + whole * share, np.full_like(share, whole), np.zeros_like(share)
 
 
-class Profile(Frozen):
+class Profile(_Kind):
     """Through given angles, smoothly."""
 
     kind: Literal["profile"] = "profile"
     angles: Annotated[tuple[float, ...], Field(min_length=2)]  # [rad], not wrapped: 6.283 is a turn away from 0
     progress: tuple[float, ...] | None = None  # [-] share of the path at each angle, 0 … 1; None spaces them evenly
+    # [rad] root mean square distance from the angles; None: 0, unless so many are so close that their rounding would
+    # bend the profile: then what that rounding explains
+    tolerance: NonNegativeFloat | None = None
 
     @model_validator(mode="after")
     def _progress_ascends(self) -> Self:
@@ -75,10 +88,27 @@ class Profile(Frozen):
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """As for Tangent."""
         from caster_gym.paths.interpolation import open_spline  # SciPy takes a while to import
+        from caster_gym.paths.smoothing import smoothed
 
-        at = np.linspace(0.0, 1.0, len(self.angles)) if self.progress is None else np.asarray(self.progress)
-        angle, first, second, _ = open_spline(at, np.asarray(self.angles), share)
+        angles = np.asarray(self.angles)
+        at = np.linspace(0.0, 1.0, len(angles)) if self.progress is None else np.asarray(self.progress)
+        if self._allowed[0] > 0.0 and len(angles) > 2:
+            spline = smoothed(angles[:, None], at, np.ones(len(at)), self._allowed[0], False)
+            angle, first, second = (spline(share, order)[:, 0] for order in range(3))
+        else:
+            angle, first, second, _ = open_spline(at, angles, share)
         return angle, first, second
+
+    @property
+    def _allowed(self) -> tuple[float, float]:
+        """Tolerance and step of the angles' rounding. [rad]"""
+        derived, step = rounding(np.asarray(self.angles)[:, None], HEADING_UNITS)
+        return (derived if self.tolerance is None else self.tolerance), step
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        allowed, step = self._allowed
+        return (headings_note(allowed, step if self.tolerance is None else None),) if allowed > 0.0 else ()
 
 
 _KINDS: dict[str, type[Frozen]] = {"tangent": Tangent, "fixed": Fixed, "spinning": Spinning, "profile": Profile}

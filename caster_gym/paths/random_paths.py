@@ -4,13 +4,23 @@ A path is drawn as the direction θ of its tangent and the speed v along it, bot
 defined everywhere, at rest and where it reverses too. Position is the integral of v exp(iθ).
 """
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen
-from caster_gym.paths.trajectory import Array, Plane, Trajectory, place, rest_to_rest, tabulate, whole_steps
+from caster_gym.paths.trajectory import (
+    Array,
+    Plane,
+    Trajectory,
+    place,
+    rest_to_rest,
+    rounded_down,
+    tabulate,
+    whole_steps,
+)
 
 RandomHeading = Literal["tangent", "fixed", "spinning", "profile"]
 
@@ -112,7 +122,18 @@ class RandomPaths(Frozen):
     def eased(self, factor: float) -> Self:
         """The same paths under limits divided by a factor above 1, kept to two digits, rounded down."""
         names = ("max_speed", "max_acceleration", "max_yaw_rate")
-        return self.model_copy(update={name: _rounded_down(getattr(self, name) / factor) for name in names})
+        return self.model_copy(update={name: rounded_down(getattr(self, name) / factor) for name in names})
+
+    def with_fixed_heading(self) -> Self | None:
+        """The same paths, along which the heading does not turn."""
+        return self.model_copy(update={"heading": "fixed"})
+
+    def wider(self) -> Iterator[tuple[Self, str]]:
+        """Paths that turn less sharply, and what they take, in words."""
+        for radius in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0):
+            if radius > (self.min_radius or 0.0):
+                words = f"a min_radius of {radius:g} m{' and reversing 0' if self.reversing else ''}"
+                yield self.model_copy(update={"min_radius": radius, "reversing": 0.0}), words
 
     @property
     def remedy(self) -> str:
@@ -176,8 +197,3 @@ def _integral(velocity: Plane, acceleration: Plane, time_step: float) -> Plane:
     v, a, h = velocity, acceleration, time_step
     ways = 0.5 * h * (v[:, 1:] + v[:, :-1]) + h * h / 12.0 * (a[:, :-1] - a[:, 1:])
     return np.concatenate([np.zeros_like(v[:, :1]), np.cumsum(ways, axis=1)], axis=1)
-
-
-def _rounded_down(value: float) -> float:
-    digit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
-    return float(f"{np.floor(value / digit) * digit:.12g}")

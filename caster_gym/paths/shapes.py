@@ -1,18 +1,36 @@
 """Geometric paths, each a curve p(u) that is walked from u = 0 to the number of laps at the quintic time law."""
 
 from abc import abstractmethod
-from typing import Literal, Self
+from collections.abc import Callable, Iterator
+from typing import ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt, model_validator
 
 from caster_gym.configuration import Frozen
-from caster_gym.paths.headings import Heading, Slopes, Tangent
-from caster_gym.paths.trajectory import Array, Plane, Trajectory, place, rest_to_rest, tabulate, whole_steps
+from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
+from caster_gym.paths.trajectory import (
+    Array,
+    Plane,
+    Trajectory,
+    place,
+    rest_to_rest,
+    rounded_down,
+    tabulate,
+    whole_steps,
+)
+
+Curve: TypeAlias = Callable[[Array], Slopes]
+Turn: TypeAlias = Callable[[Array, Slopes], tuple[Array, Array, Array]]
+
+
+SIZES = tuple(digit * 10.0**power for power in range(-3, 3) for digit in (1.0, 2.0, 5.0))  # [m] that advice tries
 
 
 class Shape(Frozen):
     """A curve, how often and how long it is walked, and where it lies. At rest at both ends."""
+
+    _sizes: ClassVar[tuple[str, ...]]  # fields in m that make it larger
 
     shape: str
     duration: PositiveFloat = 10.0  # [s] of all laps together, rounded to whole time steps
@@ -31,13 +49,24 @@ class Shape(Frozen):
 
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]:
         """The one timed trajectory of this path. Time step in s."""
-        share, rate, acceleration = rest_to_rest(whole_steps(self.duration, time_step), time_step)
-        p, first, second, third = (slope * self.laps**n for n, slope in enumerate(self.curve(share * self.laps)))
-        angle, turn, bend = self.turn(share, (p, first, second, third))
+        steps = whole_steps(self.duration, time_step)
+        table = self._walked(self.curve, self.turn, self.laps, steps, time_step)
+        return (Trajectory(self.shape, time_step, table, self.description),)
+
+    def _walked(self, curve: Curve, turn: Turn, laps: int, steps: int, time_step: float) -> Array:
+        """Samples (steps + 1, 10) of a curve and its headings, walked from rest to rest. Time step in s."""
+        share, rate, acceleration = rest_to_rest(steps, time_step)
+        p, first, second, third = (slope * laps**n for n, slope in enumerate(curve(share * laps)))
+        angle, turned, bend = turn(share, (p, first, second, third))
         motion = (p, first * rate, second * rate**2 + first * acceleration)
         motion, heading = place(motion, np.exp(1j * angle), self.centre, self.rotation)
-        turning = (heading, turn * rate, bend * rate**2 + turn * acceleration)
-        return (Trajectory(self.shape, time_step, tabulate(motion, turning)),)
+        turning = (heading, turned * rate, bend * rate**2 + turned * acceleration)
+        return tabulate(motion, turning)
+
+    @property
+    def description(self) -> str:
+        """What was made of the specification, as far as that does not stand in it."""
+        return "; ".join([self.shape, *self.heading.notes])
 
     def eased(self, factor: float) -> Self:
         """The same path, walked slower by a factor above 1; its duration keeps three digits, rounded up."""
@@ -45,10 +74,29 @@ class Shape(Frozen):
         digit = 10.0 ** (np.floor(np.log10(duration)) - 2.0)
         return self.model_copy(update={"duration": float(f"{np.ceil(duration / digit) * digit:.12g}")})
 
+    def with_fixed_heading(self) -> Self | None:
+        """The same path, along which the heading does not turn; None where its headings are its own."""
+        return self.model_copy(update={"heading": Fixed()})
+
+    def wider(self) -> Iterator[tuple[Self, str]]:
+        """The same path in larger sizes, and what each takes, in words."""
+        now = max(np.max(getattr(self, name)) for name in self._sizes)
+        for size in SIZES:
+            if size > now:
+                sizes = {name: _enlarged(size / now, getattr(self, name)) for name in self._sizes}
+                yield self.model_copy(update=sizes), " and ".join(f"{name} {value} m" for name, value in sizes.items())
+
     @property
     def remedy(self) -> str:
         """The duration of this path, as advice."""
         return f"a duration of at least {self.duration:g} s"
+
+
+def _enlarged(factor: float, size: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    """A size or sizes times a factor, rounded to three digits."""
+    if isinstance(size, tuple):
+        return tuple(float(f"{factor * one:.3g}") for one in size)
+    return float(f"{factor * size:.3g}")
 
 
 def harmonic(u: Array, amplitude: float, order: int, phase: float) -> list[Array]:
@@ -69,6 +117,7 @@ class Circle(Shape):
 
     shape: Literal["circle"] = "circle"
     radius: PositiveFloat = 1.0  # [m]
+    _sizes = ("radius",)
 
     def curve(self, u: Array) -> Slopes:
         return oval(u, self.radius, self.radius)
@@ -80,6 +129,7 @@ class Ellipse(Shape):
     shape: Literal["ellipse"] = "ellipse"
     duration: PositiveFloat = 12.0  # [s]
     semi_axes: tuple[PositiveFloat, PositiveFloat] = (1.5, 0.5)  # [m] (a, b) along x and y
+    _sizes = ("semi_axes",)
 
     def curve(self, u: Array) -> Slopes:
         return oval(u, *self.semi_axes)
@@ -91,6 +141,7 @@ class Lemniscate(Shape):
     shape: Literal["lemniscate"] = "lemniscate"
     duration: PositiveFloat = 12.0  # [s]
     width: PositiveFloat = 1.8  # [m]
+    _sizes = ("width",)
 
     def curve(self, u: Array) -> Slopes:
         x = harmonic(u, 0.5 * self.width, 1, -0.5 * np.pi)
@@ -109,14 +160,22 @@ class RoundedSquare(Shape):
     duration: PositiveFloat = 12.0  # [s]
     side: PositiveFloat = 1.2  # [m]
     rounding: PositiveFloat = 0.4  # [m] that each corner takes from the ends of its sides, as a radius would
+    _sizes = ("side", "rounding")
 
     @model_validator(mode="after")
     def _corners_fit(self) -> Self:
         if self.rounding > 0.5 * self.side:
             raise ValueError(
-                f"the rounding must be at most half the side, {0.5 * self.side:g} m, got {self.rounding:g} m"
+                f"the rounding must be at most half the side, {rounded_down(0.5 * self.side, 6):g} m, "
+                f"got {self.rounding:g} m"
             )
         return self
+
+    def wider(self) -> Iterator[tuple[Self, str]]:
+        for size in SIZES:
+            if self.rounding < size <= 0.5 * self.side:
+                yield self.model_copy(update={"rounding": size}), f"rounding {size:g} m"
+        yield from super().wider()
 
     def curve(self, u: Array) -> Slopes:
         half = 0.5 * self.side - self.rounding

@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeAlias, get_args
 from pydantic import Field
 
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
+from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.feasibility import check_feasible
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
@@ -57,7 +58,9 @@ def build_trajectories(
         try:
             trajectories = specification.trajectories(time_step)
         except ValueError as error:
-            raise ValueError(f"path {specification.shape!r}: {error}") from error
+            remedy = timed_remedy(specification, robot, time_step)
+            advice = f"; {remedy} would do" if remedy else ""
+            raise ValueError(f"path {specification.shape!r}: {error}{advice}") from error
         check_feasible(specification, trajectories, robot)
         built.extend(trajectories)
     names = named_apart([one.name for one in built])

@@ -2,28 +2,44 @@
 
 import csv
 import math
+from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
-from caster_gym.paths.headings import Heading, Slopes, Tangent
-from caster_gym.paths.shapes import Shape
-from caster_gym.paths.trajectory import Array
+from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
+from caster_gym.paths.shapes import SIZES, Shape
+from caster_gym.paths.trajectory import LEAST_STEPS, Array, Trajectory, rounded_down, whole_steps
+from caster_gym.paths.walks import MOST_ROUNDED, Walk
+from caster_gym.paths.waypoints import SAME_PLACE, Track, Turns, read_track
 
 Waypoint = tuple[float, float] | tuple[float, float, float]
 
-_TOO_CLOSE = 1e-9  # [m] two waypoints are one
+_LEAST_SIZE = 10.0  # [-] a path through waypoints is at least so many tolerances long or wide
+_TURN_WAY = 0.3  # [m/rad] a turn on the spot takes as long as this way
 
 
 class Spline(Shape):
-    """A smooth curve through waypoints, four times continuously differentiable."""
+    """A smooth curve through waypoints, or beside them if they are noisy, four times continuously differentiable.
+
+    It is at rest where waypoints of one place have different headings, and turns there on the spot. Waypoints of a
+    single place keep the robot there. Other repeated waypoints say nothing: a stay at a place needs times.
+    """
 
     shape: Literal["spline"] = "spline"
-    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=2)]  # (x, y) [m] or (x, y, heading) [m, m, rad]
+    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]  # (x, y) [m] or (x, y, heading) [m, m, rad]
     file: Annotated[str | None, Field(exclude=True)] = None  # CSV with the header x,y or x,y,heading; read at once
-    closed: bool = False  # back to the first waypoint, which is not repeated
+    closed: bool = False  # back to the first waypoint, which need not be repeated
+    # [m] root mean square distance from the waypoints; None: 0, through them, unless so many are so close that their
+    # rounding would bend the curve: then what that rounding explains
+    tolerance: NonNegativeFloat | None = None
+    heading_tolerance: NonNegativeFloat | None = None  # [rad] the same for the waypoints' headings
+    # headings of waypoints: each on the turn nearest to the one before, or as written; auto: as written where some is
+    # beyond half a turn, but for headings that wrap from 2π to 0
+    turns: Turns = "auto"
     # None: the waypoints' headings, else the tangent; wider than the field of Shape, which `turn` below makes good
     heading: Heading | None = None  # type: ignore[assignment]
 
@@ -38,19 +54,23 @@ class Spline(Shape):
 
     @model_validator(mode="after")
     def _waypoints_make_a_curve(self) -> Self:
-        if self.closed and len(self.waypoints) < 3:
-            raise ValueError(f"a closed spline needs at least 3 waypoints, got {len(self.waypoints)}")
         if not self.closed and self.laps > 1:
-            raise ValueError(f"an open spline has one lap, got laps {self.laps}; set 'closed' for a round course")
+            round_course = "; set 'closed' for a round course" if len(set(self.waypoints)) > 2 else ""
+            raise ValueError(f"an open spline has one lap, got laps {self.laps}{round_course}")
         if len({len(waypoint) for waypoint in self.waypoints}) > 1:
             raise ValueError("either every waypoint has a heading or none has")
         if self._has_headings and self.heading is not None:
             raise ValueError("the waypoints have headings already: leave 'heading' out, or their third numbers")
-        for i, chord in enumerate(self._chords, start=1):
-            if chord < _TOO_CLOSE:
-                last = self.closed and i == len(self.waypoints)
-                hint = "; a closed spline returns to its first waypoint by itself" if last else ""
-                raise ValueError(f"waypoints {i} and {1 if last else i + 1} are the same point{hint}")
+        x, y, *_ = zip(*self.waypoints, strict=True)
+        extent = max(max(x) - min(x), max(y) - min(y))
+        if extent > SAME_PLACE and _LEAST_SIZE * (self.tolerance or 0.0) > extent:
+            raise ValueError(
+                f"a tolerance of {self.tolerance:g} m is more than a tenth of the {extent:.3g} m that the waypoints "
+                f"extend; at most {rounded_down(extent / _LEAST_SIZE):g} m would do"
+            )
+        fewest = min((len(leg.points) - 1 for leg in self._track.legs if leg.closed), default=3)
+        if fewest < 3:
+            raise ValueError(f"a closed spline needs at least 3 waypoints at different places, got {fewest}")
         return self
 
     @property
@@ -58,42 +78,99 @@ class Spline(Shape):
         return len(self.waypoints[0]) == 3
 
     @property
-    def _points(self) -> Array:
-        """Waypoints (n, 2 or 3) of one lap, first to last; each heading is on the turn nearest to the one before."""
-        points = np.asarray(self.waypoints + self.waypoints[:1] if self.closed else self.waypoints)
-        if self._has_headings:
-            points[:, 2] = np.unwrap(points[:, 2])
-        return points
+    def _track(self) -> Track:
+        return _read_track(self.waypoints, self.closed, self.laps, self.tolerance, self.heading_tolerance, self.turns)
 
     @property
-    def _chords(self) -> Array:
-        steps = np.diff(self._points[:, :2], axis=0)
-        return np.hypot(steps[:, 0], steps[:, 1])
+    def description(self) -> str:
+        """What was made of the waypoints."""
+        count = len(self.waypoints)
+        notes = self.heading.notes if self.heading is not None else ()
+        return "; ".join([f"spline of {count} waypoint{'s' if count > 1 else ''}", *self._track.notes, *notes])
 
     @property
-    def _stations(self) -> Array:
-        """u at the waypoints, in proportion to the chords between them, so that the speed varies little."""
-        lengths = np.concatenate([[0.0], np.cumsum(self._chords)])
-        return np.asarray(lengths / lengths[-1], dtype=np.float64)
+    def _walks(self) -> tuple[Walk, ...]:
+        return _walks(self.waypoints, self.closed, self.laps, self.tolerance, self.heading_tolerance, self.turns)
 
-    def _through(self, values: Array, u: Array) -> Array:
-        from caster_gym.paths.interpolation import closed_spline, open_spline  # SciPy takes a while to import
-
-        return (closed_spline if self.closed else open_spline)(self._stations, values, u)
+    def trajectories(self, time_step: float) -> tuple[Trajectory, ...]:
+        walks = self._walks
+        if len(walks) == 1:
+            return super().trajectories(time_step)
+        whole = whole_steps(self.duration, time_step)
+        # time by the root of the way: then all legs need about the same greatest acceleration
+        efforts = np.sqrt([walk.way + _TURN_WAY * walk.turning for walk in walks])
+        spare = whole - LEAST_STEPS * len(walks)
+        if spare < 0:
+            raise ValueError(
+                f"a duration of {self.duration:g} s is too short for {len(walks)} legs from rest to rest, each of "
+                f"which needs at least {LEAST_STEPS} time steps of {time_step:g} s"
+            )
+        ends = np.rint(spare * np.cumsum(efforts) / efforts.sum()).astype(int)
+        steps = LEAST_STEPS + np.diff(ends, prepend=0)
+        tables = [
+            self._walked(walk.curve, walk.turn, 1, int(count), time_step)
+            for walk, count in zip(walks, steps, strict=True)
+        ]
+        rows = np.concatenate([tables[0][:1], *(table[1:] for table in tables)])
+        return (Trajectory(self.shape, time_step, rows, self.description),)
 
     def curve(self, u: Array) -> Slopes:
-        points = self._points
-        x, y = self._through(points[:, 0], u), self._through(points[:, 1], u)
-        a, b, c, d = (x[n] + 1j * y[n] for n in range(4))
-        return a, b, c, d
+        return self._walks[0].curve(u)
 
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
+        (walk,) = self._walks
+        if self._has_headings:
+            angle, first, second = walk.turn(share * self.laps, slopes)
+            return angle, first * self.laps, second * self.laps**2
+        heading = self.heading or Tangent()
+        if walk.way == 0.0 and isinstance(heading, Tangent):
+            heading = Fixed(angle=heading.offset)  # there is no tangent: as along x
+        return heading.turn(share, slopes)
+
+    def without_headings(self) -> Self:
+        """The same way, always at the first heading."""
         if not self._has_headings:
-            return (self.heading or Tangent()).turn(share, slopes)
-        angles, u = self._points[:, 2], share * self.laps
-        whole = angles[-1] - angles[0] if self.closed else 0.0  # [rad] a lap, spread evenly: what is left is periodic
-        rest = self._through(angles - whole * self._stations, u)
-        return rest[0] + whole * u, (rest[1] + whole) * self.laps, rest[2] * self.laps**2
+            return self
+        bare = tuple((x, y) for x, y, *_ in self.waypoints)
+        return self.model_copy(
+            update={"waypoints": bare, "heading": Fixed(angle=float(np.array(self.waypoints)[0, 2]))}
+        )
+
+    def with_fixed_heading(self) -> Self | None:
+        return None if self._has_headings else super().with_fixed_heading()
+
+    def wider(self) -> Iterator[tuple[Self, str]]:
+        x, y, *_ = zip(*self.waypoints, strict=True)
+        most = max(max(x) - min(x), max(y) - min(y)) / _LEAST_SIZE
+        for tolerance in SIZES:
+            if self._track.tolerance < tolerance <= most:
+                yield self.model_copy(update={"tolerance": tolerance}), f"a tolerance of {tolerance:g} m"
+
+
+@lru_cache(maxsize=32)
+def _read_track(
+    waypoints: tuple[Waypoint, ...],
+    closed: bool,
+    laps: int,
+    tolerance: float | None,
+    heading_tolerance: float | None,
+    turns: Turns,
+) -> Track:
+    return read_track(waypoints, closed, laps, tolerance, heading_tolerance, turns)
+
+
+@lru_cache(maxsize=32)
+def _walks(
+    waypoints: tuple[Waypoint, ...],
+    closed: bool,
+    laps: int,
+    tolerance: float | None,
+    heading_tolerance: float | None,
+    turns: Turns,
+) -> tuple[Walk, ...]:
+    track = _read_track(waypoints, closed, laps, tolerance, heading_tolerance, turns)
+    most = np.inf if tolerance is not None else MOST_ROUNDED * track.tolerance
+    return tuple(Walk(leg, track.tolerance, most, track.heading_tolerance) for leg in track.legs)
 
 
 def read_waypoints(path: Path) -> tuple[tuple[float, ...], ...]:

@@ -28,6 +28,7 @@ class Trajectory:
     name: str
     time_step: float  # [s]
     samples: Array
+    description: str = ""  # what was made of the path, as far as that does not stand in it
 
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)
@@ -42,8 +43,7 @@ class Trajectory:
         if turn.max() > MOST_TURN:
             raise ValueError(
                 f"the heading of path {self.name!r} turns by {turn.max():.2g} rad in the time step after "
-                f"{turn.argmax() * self.time_step:.3g} s, more than {MOST_TURN:g} rad; a tangent does that where "
-                f"the path turns back on the spot: give it a fixed heading or a wider turn"
+                f"{turn.argmax() * self.time_step:.3g} s, more than {MOST_TURN:g} rad"
             )
         samples.flags.writeable = False
         object.__setattr__(self, "samples", samples)
@@ -52,6 +52,13 @@ class Trajectory:
     def duration(self) -> float:
         """Time from the first sample to the last. [s]"""
         return (len(self.samples) - 1) * self.time_step
+
+
+def rounded_down(value: float, digits: int = 2) -> float:
+    """A positive value to so many digits, as advice: not above the value."""
+    digit = 10.0 ** (np.floor(np.log10(value)) + 1.0 - digits)
+    whole = np.floor(value / digit * (1.0 + 1e-12))  # 0.3 / 0.1 is a little less than 3
+    return float(f"{whole * digit:.12g}")
 
 
 def check_time_step(time_step: float) -> None:
@@ -66,7 +73,7 @@ def whole_steps(duration: float, time_step: float) -> int:
     if duration > MOST_STEPS * time_step:
         raise ValueError(
             f"a duration of {duration:g} s is more than {MOST_STEPS} time steps of {time_step:g} s; "
-            f"at most {MOST_STEPS * time_step:g} s would do"
+            f"at most {rounded_down(MOST_STEPS * time_step, 6):g} s would do"
         )
     steps = round(duration / time_step)
     if steps < LEAST_STEPS:
