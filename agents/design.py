@@ -68,7 +68,9 @@ class DesignReport:
     after: Requirement
 
 
-def read_design(target: str, robot: str | None = None, changes: Mapping[str, Any] | None = None) -> DesignSettings:
+def read_design(
+    target: str | Path, robot: str | None = None, changes: Mapping[str, Any] | None = None
+) -> DesignSettings:
     """Settings from a name in configs/designs or a YAML file, with some of them changed.
 
     Raises ValueError for settings that are wrong by themselves, and for those with which the robot cannot be designed.

@@ -17,13 +17,14 @@ from pydantic import (
 )
 
 from caster_gym.arena.arena import Arena, read_arena
-from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
+from caster_gym.robot import Robot, load_robot
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
 
@@ -66,7 +67,7 @@ class ChosenTask(Frozen):
 class TaskSettings(ChosenTask):
     """A robot, its task, and the paths to train, to choose and to test on."""
 
-    robot: str = "chung2008"  # name, or path of a YAML file
+    robot: Robot | str = "chung2008"  # a mapping as in configs/robots, the name of a file there, or path of one
     actuation: Literal["all"] | tuple[str, ...] | None = None  # None: as the robot file says
     arena: Arena = Arena()  # or the name of a YAML file
     wrappers: tuple[FeatureSpecification, ...] = ()  # features in training and in evaluation alike
@@ -74,6 +75,11 @@ class TaskSettings(ChosenTask):
     train: Paths
     validation: Paths
     test: Paths
+
+    @field_validator("robot", mode="before")
+    @classmethod
+    def _robot_may_be_a_mapping(cls, robot: Any) -> Any:
+        return load_robot(robot) if isinstance(robot, Mapping) else robot
 
     @field_validator("arena", mode="before")
     @classmethod
@@ -242,10 +248,10 @@ class BenchmarkSettings(Frozen):
 Settings = TypeVar("Settings", bound=BaseModel)
 
 
-def find(kind: str, name: str) -> Path:
+def find(kind: str, name: str | Path) -> Path:
     """The file of a task, agent or benchmark: one that comes with the package, by its name, or a path."""
     path = Path(name).expanduser()
-    if path.suffix in (".yaml", ".yml"):
+    if is_yaml(path):
         return path
     folder = Path(str(files("caster_gym.configs"))) / kind
     path = folder / f"{name}.yaml"
@@ -255,13 +261,13 @@ def find(kind: str, name: str) -> Path:
     return path
 
 
-def read_settings(model: type[Settings], kind: str, name: str) -> Settings:
+def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:
     """Checked settings from a file that `find` finds."""
     path = find(kind, name)
     return parse(model, read_yaml(path), str(path))
 
 
-def read_agent(name: str, changes: Mapping[str, Any] | None = None) -> AgentSettings:
+def read_agent(name: str | Path, changes: Mapping[str, Any] | None = None) -> AgentSettings:
     """Checked settings of an agent, with some fields changed."""
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}

@@ -68,6 +68,11 @@ _Loader.add_implicit_resolver(
 )
 
 
+def is_yaml(path: str | Path) -> bool:
+    """Whether a name is that of a YAML file, by its suffix."""
+    return Path(path).suffix.lower() in (".yaml", ".yml")
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds a mapping."""
     try:

@@ -23,6 +23,7 @@ from caster_gym.agents.settings import (
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.robot import load_robot
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {
@@ -208,3 +209,17 @@ def test_a_path_is_taken_as_it_is(tmp_path):
     assert find("agents", str(tmp_path / "mine.yaml")) == tmp_path / "mine.yaml"
     with pytest.raises(ConfigurationError, match=r"there is no file '.*mine\.yaml'"):
         read_agent(str(tmp_path / "mine.yaml"))
+
+
+@pytest.mark.parametrize("kind", ["agents", "tasks", "benchmarks", "designs"])
+def test_a_file_is_known_by_its_suffix_in_any_case(tmp_path, kind):
+    assert find(kind, tmp_path / "MINE.YAML") == find(kind, str(tmp_path / "MINE.YAML")) == tmp_path / "MINE.YAML"
+
+
+def test_the_robot_of_a_task_may_be_a_mapping():
+    robot = load_robot("tidybot2")
+    settings = parse(TaskSettings, {**PATHS, "robot": robot.model_dump(mode="json")}, "task")
+    assert settings.robot == robot
+    assert parse(TaskSettings, settings.model_dump(mode="json"), "task") == settings
+    with pytest.raises(ConfigurationError, match=r"task: 'robot': robot: unknown key 'nam'; did you mean 'name'\?$"):
+        parse(TaskSettings, {**PATHS, "robot": {**robot.model_dump(mode="json"), "nam": 1}}, "task")
