@@ -1,14 +1,12 @@
 """Paths to be followed at the robot's own pace: where they lead, and how fast the robot's motors can drive them."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.arc_length import LINE_COLUMNS, CoarseSpacingError, Line, NoLineError, between, line_along
-from caster_gym.paths.specification import AnyPath, named_apart, read_paths
+from caster_gym.paths.specification import AnyPath, PathLike, named_apart, read_paths
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.time_law import fastest_laws, row_times
 from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory, check_time_step, tabulate
@@ -86,7 +84,7 @@ class Course:
 
 
 def build_courses(
-    path: str | Mapping[str, Any] | AnyPath | Sequence[Any],
+    path: PathLike,
     robot: Robot,
     speed_limit: float,
     free_heading: bool = False,
