@@ -166,6 +166,25 @@ def test_follow_takes_the_geometry_of_a_timed_path():
     assert other.duration == pytest.approx(course.duration, rel=1e-3)
 
 
+@pytest.mark.parametrize("digits", [3, 12])
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_follow_takes_logs_that_rest_and_waver(digits, noise):
+    t = np.arange(0.0, 18.0, 0.02)
+    log = moving(np.clip(t - 4.0, 0.0, 8.0))
+    log[:, 1:3] += noise * np.random.default_rng(0).standard_normal((len(t), 2))
+    (course,) = build_courses(np.column_stack([t, np.round(log[:, 1:], digits)]), ROBOT, 1.0)
+    fine = moving(np.linspace(0.0, 8.0, 10_001))
+    assert course.name == "timed"
+    assert course.length == pytest.approx(np.hypot(*np.diff(fine[:, 1:3], axis=0).T).sum(), rel=3e-3)
+    # y = 0.4 sin(2 x) bends by 0.4 · 2² 1/m at its crest; noise through which a spline leads makes hundreds
+    assert 0.9 * 1.6 < np.abs(course.samples[:, 4]).max() < 1.2 * 1.6
+
+
+def test_follow_passes_a_rest_on_the_way():
+    (course,) = build_courses(STEPS, ROBOT, 1.0)
+    assert np.hypot(*(course.samples[:, :2] - [1.0, 0.0]).T).min() < 0.01  # half of a row
+
+
 def test_poses_without_headings_face_their_way():
     t = np.linspace(0.0, 8.0, 401)
     (trajectory,) = Timed(poses=moving(t)[:, :3].tolist()).trajectories(0.02)

@@ -10,11 +10,13 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import AngleUnit, Rotation, plain, read_angles
 from caster_gym.paths.files import ZeroAxis, read_poses, unwrapped
+from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import LEAST_STEPS, MOST_STEPS, Array, Trajectory, check_time_step, place, tabulate
 
 TimedPose = tuple[float, float, float] | tuple[float, float, float, float]
 Rates = tuple[float, float, float, float, float, float]
 
+_APART = 8.0  # [-] of the noise: what is left of it in smoothed poses does not make a way
 _SLOW = 0.05  # [-] of the greatest speed, below which the direction of motion is not told by it
 
 
@@ -160,6 +162,21 @@ class Timed(Frozen):
             told.append(f"headings smoothed, at {turn_noise:.2g} rad from those given (root mean square)")
         return "; ".join(told)
 
+    def geometry(self) -> Spline:
+        """The way through the poses, whatever their times are: rests and repeated poses say nothing."""
+        table = np.asarray(self.poses)[:, 1:]
+        if self._has_headings:
+            table[:, 2] = unwrapped(table[:, 2])
+        place_noise, turn_noise = self._noise
+        fields: dict[str, Any] = {"centre": self.centre, "rotation": self.rotation}
+        if place_noise > 0.0:
+            smooth = self._motion(self._times)[0]
+            table = smooth[_apart(smooth[:, :2], _APART * place_noise), : table.shape[1]]
+            fields["tolerance"] = 2.0**0.5 * place_noise  # of the distance, from that of each coordinate
+        if self._has_headings:
+            fields.update(unit="rad", turns="as_written", heading_tolerance=turn_noise or None)
+        return Spline(waypoints=table.tolist(), **fields)
+
     def with_fixed_heading(self) -> Self | None:
         """The same way without a turn; None where headings are given."""
         if self._has_headings:
@@ -189,6 +206,15 @@ def timed_from(trajectory: Trajectory) -> Timed:
     times = trajectory.time_step * np.arange(len(t))
     poses = np.column_stack([times, t[:, 0], t[:, 1], heading])
     return Timed.model_validate({"poses": poses.tolist(), "rates": t[:, 4:].tolist(), "unit": "rad"})
+
+
+def _apart(points: Array, least: float) -> list[int]:
+    """Points (K, 2) that are so far [m] from the one taken before, without those that waver around a place."""
+    taken = [0]
+    for k, point in enumerate(points):
+        if np.hypot(*(point - points[taken[-1]])) >= least:
+            taken.append(k)
+    return taken
 
 
 def _hermite(at: Array, values: Array, rates: Array, times: Array) -> Array:
