@@ -192,12 +192,12 @@ def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tupl
     return tuple(joints)
 
 
-def load_robot(name: str | Path | Mapping[str, Any] | Robot) -> Robot:
-    """A robot that comes with the package, by its name, or one from a YAML file or a mapping of your own."""
+def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
+    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one."""
     if isinstance(name, Robot):
         return name
     if isinstance(name, Mapping):
-        return parse(Robot, name, "robot")
+        return parse(Robot, name, "the robot")
     path = Path(name).expanduser()
     if not is_yaml(path):
         folder = Path(str(files("caster_gym.configs"))) / "robots"

@@ -29,7 +29,7 @@ from caster_gym.paths.specification import AnyPath, build_trajectories, read_pat
 from caster_gym.paths.specification import PathLike as PathLike
 from caster_gym.robot import Robot, load_robot
 
-RobotLike: TypeAlias = str | Path | Mapping[str, Any] | Robot
+RobotLike: TypeAlias = str | Path | Robot | Mapping[str, Any]
 ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
 Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
 
