@@ -221,5 +221,7 @@ def test_the_robot_of_a_task_may_be_a_mapping():
     settings = parse(TaskSettings, {**PATHS, "robot": robot.model_dump(mode="json")}, "task")
     assert settings.robot == robot
     assert parse(TaskSettings, settings.model_dump(mode="json"), "task") == settings
-    with pytest.raises(ConfigurationError, match=r"task: 'robot': the robot: unknown key 'nam'; did you mean 'name'\?$"):
+    with pytest.raises(
+        ConfigurationError, match=r"task: 'robot': the robot: unknown key 'nam'; did you mean 'name'\?$"
+    ):
         parse(TaskSettings, {**PATHS, "robot": {**robot.model_dump(mode="json"), "nam": 1}}, "task")
