@@ -193,7 +193,7 @@ def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tupl
 
 
 def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
-    """A robot that comes with the package, by its name, or one of your own: from a YAML file or a mapping like it."""
+    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one."""
     if isinstance(name, Robot):
         return name
     if isinstance(name, Mapping):
