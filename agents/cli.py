@@ -18,6 +18,7 @@ from .command_line import (
     TaskName,
     Threads,
     changes_of,
+    files_among,
     plain_errors,
     progress,
 )
@@ -68,7 +69,7 @@ def train(
         if isinstance(settings, ComputedTorqueSettings):
             raise ValueError(f"agent {agent!r} does not learn; try it with `caster-gym evaluate {agent}`")
         tasks = read_settings(TaskSettings, "tasks", task)
-        kept = (Path(agent), Path(task), Path(tasks.robot))
+        kept = files_among(agent, task, tasks.robot)
         bar = {"total": settings.steps, "desc": f"{Path(agent).stem} seed {seed}", "unit": "step", "unit_scale": True}
         with begun(out, overwrite, "best/policy.yaml", kept), progress(**bar) as show:
 
@@ -102,7 +103,7 @@ def evaluate(
 
         tasks = read_settings(TaskSettings, "tasks", task)
         settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
-        for read in (Path(task), Path(tasks.robot)):
+        for read in files_among(task, tasks.robot):
             check_free(out, overwrite, kept=read)
         with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
             test = test_batch(tasks, tasks.test, starts)
@@ -132,8 +133,8 @@ def benchmark(
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
-        named = (config, settings.task, comparison.task.robot, *settings.agents)
-        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=tuple(map(Path, named))):
+        named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
+        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=named):
             text = run_benchmark(comparison, out, threads)
         typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")

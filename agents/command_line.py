@@ -39,6 +39,11 @@ def changes_of(options: list[str] | None) -> dict[str, Any]:
     return parsed
 
 
+def files_among(*names: object) -> tuple[Path, ...]:
+    """Those of the names of settings that may be names of files; a robot that stands in the settings has none."""
+    return tuple(Path(name) for name in names if isinstance(name, str | Path))
+
+
 @contextmanager
 def progress(**options: Any) -> Iterator[Callable[..., None]]:
     """show(done, words) for a bar that appears when there is something to show, and not above a refusal."""

@@ -23,6 +23,7 @@ from caster_gym.envs.track_task import TrackTask
 from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
+from caster_gym.robot import Robot, load_robot
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
@@ -71,7 +72,7 @@ class TaskSettings(ChosenTask):
         {name for kind in TASKS.values() for name in kind.model_fields}
     )
 
-    robot: NameOrFile = "chung2008"  # name, or path of a YAML file
+    robot: Robot | NameOrFile = "chung2008"  # a mapping as in configs/robots, the name of a file there, or path of one
     actuation: Literal["all"] | tuple[str, ...] | None = None  # None: as the robot file says
     arena: Arena = Arena()  # or the name of a YAML file
     wrappers: tuple[FeatureSpecification, ...] = ()  # features in training and in evaluation alike
@@ -81,6 +82,11 @@ class TaskSettings(ChosenTask):
     test: Paths
 
     _files_beside = field_validator("train", "validation", "test", mode="before")(with_files_beside)
+
+    @field_validator("robot", mode="before")
+    @classmethod
+    def _robot_may_be_a_mapping(cls, robot: Any) -> Any:
+        return load_robot(robot) if isinstance(robot, Mapping) else robot
 
     @field_validator("arena", mode="before")
     @classmethod

@@ -42,7 +42,8 @@ def test_a_reproduction_leaves_a_page_and_its_folder(papers, tmp_path):
     assert told == [("work", 0), ("done", 1)]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["differences.md", "explained", "explained.md"]
     assert "E1: a sign" in (tmp_path / "explained.md").read_text(encoding="utf-8")
-    assert "| E1 | [explained](explained.md) | (2) | 3 | 4 | measured |" in (tmp_path / "differences.md").read_text(encoding="utf-8")
+    page = (tmp_path / "differences.md").read_text(encoding="utf-8")
+    assert "| E1 | [explained](explained.md) | (2) | 3 | 4 | measured |" in page
     assert (tmp_path / "explained" / "run.yaml").is_file()
 
 

@@ -20,6 +20,7 @@ from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, find, re
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.robot import load_robot
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {
@@ -242,3 +243,19 @@ def test_advice_on_held_out_paths_helps():
         parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}, points]}, "task")
     assert len(str(caught.value)) < 300
     parse(TaskSettings, {**PATHS, "train": [points], "test": [{"shape": "circle"}]}, "task")
+
+
+@pytest.mark.parametrize("kind", ["agents", "tasks", "benchmarks", "designs"])
+def test_a_file_is_known_by_its_suffix_in_any_case(tmp_path, kind):
+    assert find(kind, tmp_path / "MINE.YAML") == find(kind, str(tmp_path / "MINE.YAML")) == tmp_path / "MINE.YAML"
+
+
+def test_the_robot_of_a_task_may_be_a_mapping():
+    robot = load_robot("tidybot2")
+    settings = parse(TaskSettings, {**PATHS, "robot": robot.model_dump(mode="json")}, "task")
+    assert settings.robot == robot
+    assert parse(TaskSettings, settings.model_dump(mode="json"), "task") == settings
+    with pytest.raises(
+        ConfigurationError, match=r"task: 'robot': the robot: unknown key 'nam'; did you mean 'name'\?$"
+    ):
+        parse(TaskSettings, {**PATHS, "robot": {**robot.model_dump(mode="json"), "nam": 1}}, "task")

@@ -26,7 +26,7 @@ def test_nothing_means_an_arena_without_obstacles():
 
 
 def test_an_arena_can_be_a_yaml_file(tmp_path):
-    file = tmp_path / "arena.yaml"
+    file = tmp_path / "ARENA.YAML"  # suffixes count in upper case, too
     file.write_text("{pillars: [{centre: [1e0, 2], radius: 2e-1}], restitution: 0.9}", encoding="utf-8")
     expected = read_arena({"pillars": [{"centre": [1.0, 2.0], "radius": 0.2}], "restitution": 0.9})
     assert read_arena(str(file)) == read_arena(file) == expected

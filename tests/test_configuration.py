@@ -7,7 +7,7 @@ import pytest
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from caster_gym import load_robot
-from caster_gym.configuration import ConfigurationError, Frozen, parse, parse_yaml, read_yaml
+from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, parse_yaml, read_yaml
 
 
 class Gain(Frozen):
@@ -275,3 +275,10 @@ def test_an_alias_bomb_is_refused_in_a_short_sentence(tmp_path):
 def test_whatever_yaml_cannot_read_is_told_with_its_source(text):
     with pytest.raises(ConfigurationError, match="the source cannot be read as YAML"):
         parse_yaml(text, "the source")
+
+
+@pytest.mark.parametrize(
+    ("name", "yes"), [("a.yaml", True), ("A.YML", True), (Path("b/c.Yaml"), True), ("yaml", False)]
+)
+def test_yaml_files_are_known_by_their_suffix_in_any_case(name, yes):
+    assert is_yaml(name) is yes

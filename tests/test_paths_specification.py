@@ -39,7 +39,7 @@ def test_a_path_can_be_a_yaml_file(tmp_path):
 def test_a_path_can_be_a_csv_file_of_waypoints(tmp_path):
     file = tmp_path / "path.csv"
     file.write_text("x,y\n0,0\n1,1\n", encoding="utf-8")
-    assert read_paths(str(file)) == (Spline(file=str(file)),)
+    assert read_paths(str(file)) == (Spline(waypoints=((0.0, 0.0), (1.0, 1.0))),)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -68,10 +68,14 @@ def test_specification_is_a_type_for_models_of_others():
         ({"shape": "circle", "radius": float("nan")}, "'radius' should be a finite number, got nan"),
         ({"shape": "circle", "heading": "tangnt"}, "unknown kind 'tangnt'; did you mean 'tangent'"),
         ("spline", "'waypoints' is missing"),
+        ("timed", "'poses' is missing"),
         ("nowhere.csv", r"there is no file 'nowhere\.csv'"),
         ("nowhere.yaml", r"there is no file 'nowhere\.yaml'"),
         ([], "at least one path is needed, got none"),
-        (["circle", 3], "a path is a name, a mapping or a sequence of these, got 3"),
+        (
+            ["circle", 3],
+            "a path is a name, a file, a mapping, a Trajectory, a list of points or a sequence of these, got 3",
+        ),
     ],
 )
 def test_what_is_no_path_is_refused_by_name(path, message):

@@ -1,4 +1,4 @@
-"""caster_gym.paths.splines: curves through waypoints, and CSV files of them."""
+"""caster_gym.paths.splines: curves through waypoints."""
 
 import re
 
@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
-from caster_gym.paths.splines import Spline, read_waypoints
+from caster_gym.paths.splines import Spline
 from tests.motion_laws import derivative_error
 
 TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
@@ -117,33 +117,6 @@ def test_a_dumped_spline_keeps_its_waypoints_and_needs_its_file_no_more(tmp_path
     dumped = Spline(file=str(file)).model_dump()
     file.unlink()
     assert Spline(**dumped).waypoints == TRIANGLE
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x,y\n0,0\n1,a\n", "line 3: 'a' is not a number"),
-        ("x,y\n0,0\n\n1,inf\n", "line 4: a coordinate must be finite, got 'inf'"),
-        ("x,y\n0,0\n1,2,3\n", "line 3: expected 2 values, got 3: '1,2,3'"),
-        ("x,z\n0,0\n", "line 1: the header must be x,y or x,y,heading, got 'x,z'"),
-        ("0,0\n1,1\n", "line 1: the header must be x,y or x,y,heading, got '0,0'"),
-        ("", "line 1: the header must be x,y or x,y,heading, got ''"),
-    ],
-)
-def test_bad_csv_is_refused_with_file_line_and_value(tmp_path, text, message):
-    file = tmp_path / "course.csv"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=message) as error:
-        read_waypoints(file)
-    assert str(file) in str(error.value)
-
-
-def test_a_missing_or_unreadable_file_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"there is no file .*nowhere\.csv"):
-        read_waypoints(tmp_path / "nowhere.csv")
-    (tmp_path / "binary.csv").write_bytes(b"x,y\n\xff\xfe\n")
-    with pytest.raises(ValueError, match=r"binary\.csv cannot be read as CSV"):
-        read_waypoints(tmp_path / "binary.csv")
 
 
 # ---- Turning on the spot, and standing still

@@ -128,6 +128,13 @@ def test_good_file_is_loaded_by_its_path(tmp_path):
     assert load_robot(robot) is robot
 
 
+def test_a_robot_may_be_a_mapping_or_a_file_with_an_upper_case_suffix(tmp_path):
+    file = write(tmp_path).rename(tmp_path / "ROBOT.YAML")
+    assert load_robot(GOOD) == load_robot(file) == load_robot(str(file)) == load_robot(load_robot(GOOD).model_dump())
+    with pytest.raises(ConfigurationError, match=r"robot: unknown key 'plattform'; did you mean 'platform'\?"):
+        load_robot({**GOOD, "plattform": {}})
+
+
 def test_unknown_name_is_answered_with_the_known_ones():
     with pytest.raises(ConfigurationError, match=r"unknown robot 'tidybot3'; known are .*chung2008.*tidybot2.*xr4000"):
         load_robot("tidybot3")

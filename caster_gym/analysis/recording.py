@@ -1,6 +1,6 @@
 """Recordings of a robot that moves under known torques: CSV files, and examples from the simulator.
 
-A file has one row a sample, at a constant time step, and a header that names each column with its unit. In any order:
+A file has one row a sample and a header that names each column with its unit. In any order:
 
     time [s]                           of the sample
     x [m], y [m], heading [rad]        pose of C in the world; the heading may wrap or not
@@ -9,47 +9,23 @@ A file has one row a sample, at a constant time step, and a header that names ea
     torque_roll_1 [N m], torque_steer_1 [N m], …      at the joints, held from this sample to the next
     motor_roll_1 [N m], motor_steer_1 [N m], …        instead of these: at the motors, which `gear` couples
 
-Lengths may be in m, cm or mm, angles in rad or deg, times in s or ms, torques in N m or mN m. Columns without a unit
-are in the first one given here.
+Columns without a unit are in the one given here. docs/files.md tells which other units, names and separators are read.
+Other columns are left out, and times that jitter are made even; a TableNote tells of both.
 """
 
 import csv
-import math
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
-from caster_gym.configuration import Frozen, did_you_mean
+from caster_gym.analysis.recording_table import FEWEST_ROWS, POSE, TWIST, Array, read_measured
+from caster_gym.configuration import Frozen
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.time_step import longest_time_step, substeps_for
-from caster_gym.mechanics.motors import joint_torques
-from caster_gym.mechanics.parameters import Dynamics, robot_parameters
-from caster_gym.mechanics.scalars import each, flatten, pairs
+from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
-
-FEWEST_ROWS = 10
-POSE = ("x", "y", "heading")
-TWIST = ("vx", "vy", "yaw_rate")
-_EVEN = 0.01  # [-] of the time step by which a sample may come too early or too late
-_UNITS = {
-    "time": {"s": 1.0, "ms": 1e-3},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
-    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rate": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
-    "torque": {"N m": 1.0, "mN m": 1e-3},
-}
-_QUANTITIES = {
-    "time": "time", "x": "length", "y": "length", "heading": "angle", "vx": "velocity", "vy": "velocity",
-    "yaw_rate": "rate", "steering": "angle", "torque": "torque", "motor": "torque",
-}  # fmt: skip
 
 
 class Noise(Frozen):
@@ -161,7 +137,17 @@ def substeps_of(robot: Robot, time_step: float) -> int:
     return substeps_for(time_step, longest_time_step(robot))
 
 
-def write_recording(path: Path, recording: Recording) -> None:
+_UNITS = {
+    "time": "s", "x": "m", "y": "m", "heading": "rad", "vx": "m/s", "vy": "m/s", "yaw_rate": "rad/s",
+    "steering": "rad", "rolling": "rad", "torque": "N m",
+}  # fmt: skip
+
+
+def _unit(name: str) -> str:
+    return _UNITS.get(name) or _UNITS[name.split("_")[0]]
+
+
+def write_recording(path: str | Path, recording: Recording) -> None:
     """A CSV file as `read_recording` reads it, with ten significant digits."""
     casters = range(1, recording.steering.shape[1] + 1)
     names = ["time", *POSE, *(TWIST if recording.twist is not None else ())]
@@ -169,121 +155,13 @@ def write_recording(path: Path, recording: Recording) -> None:
     names += [f"torque_{kind}_{i}" for i in casters for kind in ("roll", "steer")]
     time = recording.time_step * np.arange(len(recording.pose))
     rows = np.column_stack([time, recording.measured, recording.torque])
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with Path(path).expanduser().open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([f"{name} [{next(iter(_units(name)))}]" for name in names])
+        writer.writerow([f"{name} [{_unit(name)}]" for name in names])
         writer.writerows([[f"{number:.10g}" for number in row] for row in rows])
 
 
-def read_recording(path: Path, robot: Robot) -> Recording:
-    """A recording of a robot from a CSV file. Raises ValueError that names column, line and value of what is wrong."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-    except FileNotFoundError:
-        raise ValueError(f"there is no file {str(path)!r}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path} cannot be read as CSV: {error}") from error
-    while rows and not any(cell.strip() for cell in rows[-1]):
-        rows.pop()
-    table = _Table(path, [_column(path, cell) for cell in header], rows)
-    n = robot.caster_count
-    steering = [f"steering_{i}" for i in range(1, n + 1)]
-    names = {column.name for column in table.columns}
-    at = "motor" if any(name.startswith("motor_") for name in names) else "torque"
-    torques = [f"{at}_{joint}" for joint in robot.joints]
-    twist = list(TWIST) if names & set(TWIST) else []
-    _check_columns(table, robot, ["time", *POSE, *twist, *steering, *torques], [*TWIST])
-    if len(rows) < FEWEST_ROWS:
-        raise ValueError(f"{path} has {len(rows)} samples; a recording needs at least {FEWEST_ROWS}")
-    given = table.numbers(torques)
-    if at == "motor":
-        casters = robot_parameters(robot).casters
-        given = np.stack(flatten(each(joint_torques, (), pairs(tuple(given.T)), casters)), axis=1)
-    return Recording(
-        time_step=_time_step(path, table.numbers(["time"])[:, 0]),
-        pose=table.numbers(POSE),
-        steering=table.numbers(steering),
-        torque=given,
-        twist=table.numbers(twist) if twist else None,
-    )
-
-
-class _Column(NamedTuple):
-    name: str
-    factor: float  # SI units in one of the file's
-
-
-class _Table(NamedTuple):
-    path: Path
-    columns: list[_Column]
-    rows: list[list[str]]
-
-    def numbers(self, names: list[str] | tuple[str, ...]) -> Array:
-        """Columns (rows, names) in SI units."""
-        places = {column.name: (place, column.factor) for place, column in enumerate(self.columns)}
-        return np.array([[self._number(line, name, *places[name]) for name in names] for line in range(len(self.rows))])
-
-    def _number(self, line: int, name: str, place: int, factor: float) -> float:
-        cells = self.rows[line]
-        if len(cells) != len(self.columns):
-            raise ValueError(
-                f"{self.path}, line {line + 2}: the header names {len(self.columns)} columns, got {len(cells)} cells"
-            )
-        try:
-            number = float(cells[place])
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise ValueError(
-                f"{self.path}, line {line + 2}: {name!r} must be a finite number, got {cells[place].strip()!r}"
-            )
-        return factor * number
-
-
-def _column(path: Path, cell: str) -> _Column:
-    match = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*", cell)
-    if match is None:
-        raise ValueError(f"{path}: a column must be called as in 'x [m]', got {cell!r}")
-    name, unit = match[1], match[2]
-    units = _units(name)
-    if unit is not None and units and unit not in units:
-        raise ValueError(f"{path}: column {name!r} must be in {' or '.join(units)}, got [{unit}]")
-    return _Column(name, units.get(unit, 1.0) if unit is not None else 1.0)
-
-
-def _units(name: str) -> dict[str, float]:
-    """Units that a column may have; none for an unknown one."""
-    quantity = _QUANTITIES.get(name) or _QUANTITIES.get(name.split("_")[0])
-    return {} if quantity is None else _UNITS[quantity]
-
-
-def _check_columns(table: _Table, robot: Robot, needed: list[str], optional: list[str]) -> None:
-    names = [column.name for column in table.columns]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{table.path}: the column {name!r} stands twice")
-    known = {*needed, *optional}
-    of_robot = f"robot {robot.name!r} of {robot.caster_count} casters"
-    missing = [name for name in needed if name not in names]
-    if missing:
-        raise ValueError(f"{table.path}: the columns {', '.join(map(repr, missing))} are missing, for {of_robot}")
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(
-            f"{table.path}: unknown column {unknown[0]!r}, for {of_robot}; {did_you_mean(unknown[0], known)}"
-        )
-
-
-def _time_step(path: Path, times: Array) -> float:
-    step = float(times[-1] - times[0]) / (len(times) - 1)
-    if step <= 0.0:
-        raise ValueError(f"{path}: 'time' must grow, got {times[0]:g} s at first and {times[-1]:g} s at last")
-    early = np.abs(np.diff(times) - step) > _EVEN * step
-    if early.any():
-        row = int(early.argmax())
-        raise ValueError(
-            f"{path}, line {row + 3}: samples must come evenly, every {step:g} s; this one comes "
-            f"{times[row + 1] - times[row]:g} s after that before"
-        )
-    return step
+def read_recording(path: str | Path, robot: Robot) -> Recording:
+    """A recording of a robot from a file. Raises ValueError that names column, line and value of what is wrong."""
+    found = read_measured(Path(path).expanduser(), robot)
+    return Recording(found.time_step, found.pose, found.steering, found.torque, found.twist)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self, TypeAlias
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, model_validator
 
 from caster_gym.arena.outlines import Outline, convex, polygon_fault
-from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
+from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 
 FARTHEST = 1e6  # [m] from the origin
 
@@ -181,7 +181,7 @@ def read_arena(arena: str | Path | Mapping[str, Any] | Arena | None) -> Arena:
         return arena
     if isinstance(arena, Mapping):
         return parse(Arena, arena, "arena")
-    if isinstance(arena, str | Path) and Path(arena).suffix in (".yaml", ".yml"):
+    if isinstance(arena, str | Path) and is_yaml(arena):
         path = Path(arena).expanduser()
         return parse(Arena, read_yaml(path), f"{path}: arena")
     raise ConfigurationError(f"an arena is a mapping or the name of a YAML file, got {arena!r}")

@@ -69,9 +69,10 @@ class CasterTrackEnv(CasterEnv):
 
     **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad.
 
-    robot: name, YAML file or Robot. path: name, specification or several (`caster_gym.paths`), of which each episode
-    draws one. actuation: "all" or the names of the driven joints; by default the robot's own. arena: obstacles
-    (`caster_gym.arena`). render_mode: "human" or "rgb_array". All other keywords are fields of
+    robot: name, YAML file, mapping or Robot. path: what `caster_gym.paths.read_paths` reads: a name, a file, points,
+    poses with times, a Trajectory, a specification, or several of these, of which each episode draws one. actuation:
+    "all" or the names of the driven joints; by default the robot's own. arena: obstacles (`caster_gym.arena`).
+    render_mode: "human" or "rgb_array". All other keywords are fields of
     `caster_gym.envs.track_task.TrackTask`, which holds the numbers above; unknown ones are errors.
     """
 

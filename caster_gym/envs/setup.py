@@ -26,13 +26,11 @@ from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.mechanics.separation import Surroundings
 from caster_gym.paths.course import build_courses
-from caster_gym.paths.specification import AnyPath, PathSpecification, build_trajectories, read_paths
+from caster_gym.paths.specification import AnyPath, build_trajectories, read_paths
+from caster_gym.paths.specification import PathLike as PathLike
 from caster_gym.robot import Robot, load_robot
 
-RobotLike: TypeAlias = str | Path | Robot
-PathLike: TypeAlias = (
-    str | Mapping[str, Any] | PathSpecification | Sequence[str | Mapping[str, Any] | PathSpecification]
-)
+RobotLike: TypeAlias = str | Path | Robot | Mapping[str, Any]
 ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
 Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
 

@@ -1,16 +1,15 @@
 """Paths to be followed at the robot's own pace: where they lead, and how fast the robot's motors can drive them."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.arc_length import LINE_COLUMNS, CoarseSpacingError, Line, NoLineError, between, line_along
-from caster_gym.paths.specification import AnyPath, named_apart, read_paths
+from caster_gym.paths.specification import AnyPath, PathLike, named_apart, read_paths
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.time_law import fastest_laws, row_times
+from caster_gym.paths.timed import Timed
 from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory, check_time_step, tabulate
 from caster_gym.robot import Robot
 
@@ -86,7 +85,7 @@ class Course:
 
 
 def build_courses(
-    path: str | Mapping[str, Any] | AnyPath | Sequence[Any],
+    path: PathLike,
     robot: Robot,
     speed_limit: float,
     free_heading: bool = False,
@@ -109,7 +108,9 @@ def build_courses(
         raise ValueError(f"margin must be above 0 and at most 1, got {margin:g}")
     lines: list[Line] = []
     for specification in read_paths(path):
-        lines.extend(_lines(specification, robot, spacing, free_heading))
+        way = specification.geometry() if isinstance(specification, Timed) else specification
+        made = _lines(way, robot, spacing, free_heading)
+        lines.extend(line if way is specification else line._replace(name=specification.shape) for line in made)
     names = named_apart([line.name for line in lines])
     lines = [line._replace(name=name) for line, name in zip(lines, names, strict=True)]
     laws = fastest_laws(lines, robot, speed_limit, margin)

@@ -8,9 +8,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen
+from caster_gym.paths.angles import AngleUnit, plain, read_angle, read_angles
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 from caster_gym.paths.trajectory import Array, Plane
+
+_LEAST_DEGREES = 45.0  # [rev] as many revolutions on one path are degrees
 
 Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first three derivatives
 
@@ -28,7 +31,13 @@ class Tangent(_Kind):
     """Along the path."""
 
     kind: Literal["tangent"] = "tangent"
-    offset: float = 0.0  # [rad] from the tangent to the body x-axis, counter-clockwise
+    offset: float = 0.0  # [rad] or `unit`, from the tangent to the body x-axis, counter-clockwise
+    unit: AngleUnit | None = None  # of the offset
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_radians(cls, content: Any) -> Any:
+        return read_angle(content, "offset")
 
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """Angle [rad] and its first two derivatives by the share of the path, 0 … 1, as the slopes are.
@@ -45,7 +54,13 @@ class Fixed(_Kind):
     """At one angle."""
 
     kind: Literal["fixed"] = "fixed"
-    angle: float = 0.0  # [rad]
+    angle: float = 0.0  # [rad] or `unit`
+    unit: AngleUnit | None = None  # of the angle
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_radians(cls, content: Any) -> Any:
+        return read_angle(content, "angle")
 
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """As for Tangent."""
@@ -57,7 +72,22 @@ class Spinning(_Kind):
 
     kind: Literal["spinning"] = "spinning"
     turns: float = 1.0  # [rev] over the whole path, counter-clockwise
-    angle: float = 0.0  # [rad] at the start
+    angle: float = 0.0  # [rad] or `unit`, at the start
+    unit: AngleUnit | None = None  # of the angle; turns are revolutions always
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_radians(cls, content: Any) -> Any:
+        return read_angle(content, "angle")
+
+    @model_validator(mode="after")
+    def _turns_are_no_degrees(self) -> Self:
+        if abs(self.turns) >= _LEAST_DEGREES:
+            raise ValueError(
+                f"'turns' counts revolutions, of which {self.turns:g} are too many; if that is in degrees, "
+                f"write {self.turns / 360.0:.6g}"
+            )
+        return self
 
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """As for Tangent."""
@@ -69,11 +99,22 @@ class Profile(_Kind):
     """Through given angles, smoothly."""
 
     kind: Literal["profile"] = "profile"
-    angles: Annotated[tuple[float, ...], Field(min_length=2)]  # [rad], not wrapped: 6.283 is a turn away from 0
+    # [rad] or `unit`, not wrapped: 6.283 is a turn away from 0
+    angles: Annotated[tuple[float, ...], Field(min_length=2)]
     progress: tuple[float, ...] | None = None  # [-] share of the path at each angle, 0 … 1; None spaces them evenly
+    unit: AngleUnit | None = None  # of the angles
     # [rad] root mean square distance from the angles; None: 0, unless so many are so close that their rounding would
     # bend the profile: then what that rounding explains
     tolerance: NonNegativeFloat | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_radians(cls, content: Any) -> Any:
+        angles = plain(content.get("angles")) if isinstance(content, Mapping) else None
+        if not isinstance(angles, list):
+            return content
+        turned, unit = read_angles(angles, content.get("unit"), "an angle")
+        return {**{key: value for key, value in content.items() if key != "unit"}, "angles": turned, **unit}
 
     @model_validator(mode="after")
     def _progress_ascends(self) -> Self:

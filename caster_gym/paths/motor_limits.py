@@ -231,7 +231,7 @@ def _friction_between(
 
     Joints may change one after the other: each counts with the worst of its friction at the point and its neighbours.
     """
-    dry = flatten(each(_dry_friction, (v,), directions, robot.casters))
+    dry = flatten(each(_dry_friction, (v, robot.platform.coulomb_speed), directions, robot.casters))
     sizes = flatten(each(_sizes, (), robot.casters))
     jumping = np.zeros(v[2].shape, dtype=np.bool_)
     for torque, size in zip(dry, sizes, strict=True):
@@ -253,10 +253,13 @@ def _friction_between(
     return here, more
 
 
-def _dry_friction(v: Vector, f: Direction, caster: CasterParameters) -> tuple[Array, Array]:
+def _dry_friction(v: Vector, coulomb_speed: float, f: Direction, caster: CasterParameters) -> tuple[Array, Array]:
     """Dry friction of a caster's two joints. [N m]"""
     roll, steer = joint_rates(v, f, caster)
-    return joint_friction(roll, 0.0, caster.roll_coulomb), joint_friction(steer, 0.0, caster.steer_coulomb)
+    return (
+        joint_friction(roll, 0.0, caster.roll_coulomb, coulomb_speed),
+        joint_friction(steer, 0.0, caster.steer_coulomb, coulomb_speed),
+    )
 
 
 def _sizes(caster: CasterParameters) -> tuple[float, float]:

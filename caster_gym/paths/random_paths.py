@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen
+from caster_gym.paths.angles import Rotation
 from caster_gym.paths.trajectory import (
     Array,
     Plane,
@@ -45,7 +46,7 @@ class RandomPaths(Frozen):
     # [m] least radius of the tangent's turns, and least way over turn of the heading; None sets no bound
     min_radius: PositiveFloat | None = None
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where all of them start, in the world
-    rotation: float = 0.0  # [rad] of all of them about that point, headings included
+    rotation: Rotation = 0.0  # [rad] of all of them about that point, headings included
 
     @model_validator(mode="after")
     def _radius_only_where_none_reverses(self) -> Self:

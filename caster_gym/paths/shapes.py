@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt, model_validator
 
 from caster_gym.configuration import Frozen
+from caster_gym.paths.angles import Rotation
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.trajectory import (
     Array,
@@ -37,7 +38,7 @@ class Shape(Frozen):
     laps: PositiveInt = 1
     heading: Heading = Tangent()
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where the origin of the shape lies, in the world
-    rotation: float = 0.0  # [rad] of the whole path about that point, headings included
+    rotation: Rotation = 0.0  # [rad] of the whole path about that point, headings included
 
     @abstractmethod
     def curve(self, u: Array) -> Slopes:

@@ -3,52 +3,109 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_args
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from caster_gym.configuration import ConfigurationError, parse, read_yaml
+from caster_gym.configuration import LONGEST_VALUE, ConfigurationError, is_yaml, parse, read_yaml
 from caster_gym.paths.advice import timed_remedy
+from caster_gym.paths.angles import plain
 from caster_gym.paths.feasibility import check_feasible
+from caster_gym.paths.files import PATH_SUFFIXES, is_path_file, read_path_file
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse, Lemniscate, RoundedSquare
 from caster_gym.paths.splines import Spline
+from caster_gym.paths.timed import Timed, timed_from
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
-AnyPath: TypeAlias = Circle | Ellipse | Lemniscate | RoundedSquare | Spline | RandomPaths
+AnyPath: TypeAlias = Circle | Ellipse | Lemniscate | RoundedSquare | Spline | Timed | RandomPaths
 PathSpecification: TypeAlias = Annotated[AnyPath, Field(discriminator="shape")]
+PathLike: TypeAlias = (
+    str | Path | Mapping[str, Any] | AnyPath | Trajectory | NDArray[np.floating[Any] | np.integer[Any]] | Sequence[Any]
+)
 
 _SHAPES: dict[str, type[AnyPath]] = {kind.model_fields["shape"].default: kind for kind in get_args(AnyPath)}
+_POINT_SIZES = {2: "spline", 3: "spline", 4: "timed"}  # numbers of (x, y), (x, y, heading), (time, x, y, heading)
 
 
-def read_paths(path: str | Mapping[str, Any] | AnyPath | Sequence[Any]) -> tuple[AnyPath, ...]:
-    """Checked paths from a name, a mapping with its shape and parameters, a checked path, or a sequence of these.
+def read_paths(path: PathLike) -> tuple[AnyPath, ...]:
+    """Checked paths from whatever names or holds one, or from a sequence of these.
 
-    A name is that of a shape with its defaults, a YAML file of one mapping, or a CSV file of waypoints. Raises
-    ConfigurationError that names the shape, the key and the value.
+    The name of a shape stands for it with its defaults; that of a file, for what docs/files.md says; a mapping holds a
+    shape and its parameters. A list or an array of points (x, y) [m] or (x, y, heading) [m, m, rad] is a spline; one of
+    (time, x, y, heading) [s, m, m, rad], and a Trajectory, are timed. Raises ConfigurationError that names the shape,
+    the key and the value.
     """
-    if isinstance(path, Sequence) and not isinstance(path, str):
+    if isinstance(path, get_args(AnyPath)):
+        return (path,)
+    if isinstance(path, Trajectory):
+        return (timed_from(path),)
+    if isinstance(path, str | Path):
+        return (_named(path),)
+    if isinstance(path, Mapping):
+        return (_read(path, "path"),)
+    points = plain(path)
+    if isinstance(points, list):
+        size = _size_of_points(points)
+        if size is not None:
+            shape = _POINT_SIZES[size]
+            return (_read({"shape": shape, "waypoints" if shape == "spline" else "poses": points}, "path"),)
         paths = tuple(one for item in path for one in read_paths(item))
         if not paths:
             raise ConfigurationError("at least one path is needed, got none")
         return paths
-    if isinstance(path, get_args(AnyPath)):
-        return (path,)
-    if isinstance(path, str) and path.endswith((".yaml", ".yml")):
-        return (_read(read_yaml(Path(path).expanduser()), f"{path}: path"),)
-    if isinstance(path, str):
-        return (_read({"shape": "spline", "file": path} if path.endswith(".csv") else {"shape": path}, "path"),)
-    if isinstance(path, Mapping):
-        return (_read(path, "path"),)
-    raise ConfigurationError(f"a path is a name, a mapping or a sequence of these, got {path!r}")
+    raise ConfigurationError(
+        f"a path is a name, a file, a mapping, a Trajectory, a list of points or a sequence of these, "
+        f"got {_brief(path)}"
+    )
 
 
-def build_trajectories(
-    path: str | Mapping[str, Any] | AnyPath | Sequence[Any], robot: Robot, time_step: float
-) -> tuple[Trajectory, ...]:
+def _named(path: str | Path) -> AnyPath:
+    """The path of a file or of the name of a shape."""
+    file = Path(path).expanduser()
+    if is_yaml(file):
+        content = read_yaml(file)
+        if isinstance(content.get("file"), str):  # relative to the file in which it stands
+            content["file"] = str(file.parent / Path(content["file"]).expanduser())
+        return _read(content, f"{path}: path")
+    if is_path_file(file):
+        return _read(read_path_file(file), f"{path}: path")
+    if isinstance(path, Path) or file.suffix or len(file.parts) > 1:
+        raise ConfigurationError(
+            f"{str(path)!r} is no file of a path by its name: those end in .yaml, {', '.join(PATH_SUFFIXES)}; "
+            f"shapes are {', '.join(sorted(_SHAPES))}"
+        )
+    return _read({"shape": path}, "path")
+
+
+def _brief(path: Any) -> str:
+    text = repr(path)
+    return text if len(text) <= LONGEST_VALUE else f"a {type(path).__name__}"
+
+
+def _size_of_points(items: list[Any]) -> int | None:
+    """Numbers of each point of a list of points, or None for a list of something else."""
+    if not items or not all(isinstance(item, list) and item and not isinstance(item[0], list) for item in items):
+        return None
+    numbers = all(isinstance(number, Real) and not isinstance(number, bool) for item in items for number in item)
+    sizes = {len(item) for item in items}
+    if not numbers:
+        return None
+    if len(sizes) > 1 or not sizes <= set(_POINT_SIZES):
+        raise ConfigurationError(
+            f"a list of points has (x, y) or (x, y, heading) for each waypoint of a spline, or (time, x, y, heading) "
+            f"for each pose of a timed path, the same for all of them; got {min(sizes)} to {max(sizes)} numbers"
+        )
+    return sizes.pop()
+
+
+def build_trajectories(path: PathLike, robot: Robot, time_step: float) -> tuple[Trajectory, ...]:
     """The timed trajectories of all paths. Time step in s.
 
     Raises ValueError for one that the motors of the robot cannot drive; the message says what would do.

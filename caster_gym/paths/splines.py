@@ -1,7 +1,5 @@
-"""Paths through waypoints, typed or read from a CSV file."""
+"""Paths through waypoints, typed or read from a file."""
 
-import csv
-import math
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -10,6 +8,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
 
+from caster_gym.paths.angles import AngleUnit, plain, read_angles
+from caster_gym.paths.files import ZeroAxis, read_waypoints
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.shapes import SIZES, Shape
 from caster_gym.paths.trajectory import LEAST_STEPS, Array, Trajectory, rounded_down, whole_steps
@@ -30,8 +30,11 @@ class Spline(Shape):
     """
 
     shape: Literal["spline"] = "spline"
-    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]  # (x, y) [m] or (x, y, heading) [m, m, rad]
-    file: Annotated[str | None, Field(exclude=True)] = None  # CSV with the header x,y or x,y,heading; read at once
+    # (x, y) [m] or (x, y, heading) [m, m, rad or `unit`]
+    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]
+    file: Annotated[str | None, Field(exclude=True)] = None  # that holds them, see docs/files.md; read at once
+    unit: AngleUnit | None = None  # of the waypoints' headings
+    zero_axis: Annotated[ZeroAxis | None, Field(exclude=True)] = None  # from which the file counts headings
     closed: bool = False  # back to the first waypoint, which need not be repeated
     # [m] root mean square distance from the waypoints; None: 0, through them, unless so many are so close that their
     # rounding would bend the curve: then what that rounding explains
@@ -46,11 +49,20 @@ class Spline(Shape):
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, content: Any) -> Any:
-        if not isinstance(content, dict) or content.get("file") is None:
+        if not isinstance(content, dict):
             return content
-        if "waypoints" in content:
-            raise ValueError("give either 'waypoints' or a 'file' of them, not both")
-        return {**content, "waypoints": read_waypoints(Path(str(content["file"])))}
+        rest = {key: value for key, value in content.items() if key != "unit"}
+        if content.get("file") is not None:
+            if "waypoints" in content:
+                raise ValueError("give either 'waypoints' or a 'file' of them, not both")
+            file, unit, zero_axis = Path(str(content["file"])), content.get("unit"), content.get("zero_axis")
+            return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest}
+        waypoints = plain(content.get("waypoints"))
+        if not isinstance(waypoints, list) or not all(isinstance(one, list) and len(one) == 3 for one in waypoints):
+            return content if waypoints is None else {**content, "waypoints": waypoints}
+        angles, kept = read_angles([one[2] for one in waypoints], content.get("unit"), "a heading")
+        turned = [[*one[:2], angle] for one, angle in zip(waypoints, angles, strict=True)]
+        return {**rest, "waypoints": turned, **kept}
 
     @model_validator(mode="after")
     def _waypoints_make_a_curve(self) -> Self:
@@ -171,40 +183,3 @@ def _walks(
     track = _read_track(waypoints, closed, laps, tolerance, heading_tolerance, turns)
     most = np.inf if tolerance is not None else MOST_ROUNDED * track.tolerance
     return tuple(Walk(leg, track.tolerance, most, track.heading_tolerance) for leg in track.legs)
-
-
-def read_waypoints(path: Path) -> tuple[tuple[float, ...], ...]:
-    """Waypoints of a CSV file with the header x,y or x,y,heading, in m and rad; empty lines do not count.
-
-    Raises ValueError that names the file, the line and the value.
-    """
-    try:
-        with path.expanduser().open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except FileNotFoundError:
-        raise ValueError(f"there is no file {str(path)!r}") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path} cannot be read as CSV: {error}") from error
-    header = [name.strip().lower() for name in lines[0]] if lines else []
-    if header not in (["x", "y"], ["x", "y", "heading"]):
-        raise ValueError(f"{path}, line 1: the header must be x,y or x,y,heading, got {','.join(header)!r}")
-    waypoints = []
-    for number, line in enumerate(lines[1:], start=2):
-        if not any(value.strip() for value in line):
-            continue
-        if len(line) != len(header):
-            raise ValueError(
-                f"{path}, line {number}: expected {len(header)} values, got {len(line)}: {','.join(line)!r}"
-            )
-        waypoints.append(tuple(_number(value, f"{path}, line {number}") for value in line))
-    return tuple(waypoints)
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise ValueError(f"{where}: {text.strip()!r} is not a number") from None
-    if not math.isfinite(value):
-        raise ValueError(f"{where}: a coordinate must be finite, got {text.strip()!r}")
-    return value
