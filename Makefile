@@ -4,7 +4,12 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help install benchmark pictures papers test lint format clean
+LOWEST := .venv-lowest
+LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_splines paths_specification \
+  paths_trajectory export_mjcf engines_numba engines_cores engines_compilation engines_compiled_files envs_caster_track \
+  agents_settings agents_bundle agents_run_folder wrappers_specification
+
+.PHONY: help install benchmark pictures papers test lowest lint format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
@@ -32,6 +37,14 @@ papers: $(INSTALLED) ## Both papers reproduced: pages, figures and tables in doc
 test: lint ## Lint, then all tests
 	$(BIN)/python -m pytest
 
+lowest: $(LOWEST)/installed ## Some of the tests with the lowest versions that pyproject.toml allows
+	$(LOWEST)/bin/python -m pytest $(LOWEST_TESTS:%=tests/test_%.py)
+
+$(LOWEST)/installed: pyproject.toml constraints-lowest.txt
+	$(PYTHON) -m venv $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet -c constraints-lowest.txt -e '.[test]'
+	@touch $@
+
 lint: $(INSTALLED) ## Style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -42,4 +55,4 @@ format: $(INSTALLED) ## Bring the sources into shape
 	$(BIN)/ruff format
 
 clean: ## Remove the environment and caches, keep runs/
-	rm -rf .venv build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf .venv $(LOWEST) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from tqdm import tqdm
 
 from caster_gym.configuration import ConfigurationError, is_yaml
+from caster_gym.engines.cores import usable_cores
 
 from .agent_settings import AgentSettings, ComputedTorqueSettings, LearnedSettings, read_agent
 from .bundle import DESCRIPTION, load_bundle
@@ -24,7 +25,7 @@ from .protocol import Agent
 from .provenance import write_provenance
 from .settings import BenchmarkSettings, TaskSettings, in_brief, names_of, read_settings
 from .summary import Result, table, write_episodes, write_summary
-from .threads import DEFAULT, limited_to, usable_cores
+from .threads import DEFAULT, limited_to
 from .track_metrics import TrackVerdict
 from .training import train
 from .training_run import Validation, verdict_on

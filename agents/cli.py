@@ -1,4 +1,4 @@
-"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, identify, export."""
+"""The command caster-gym: train, evaluate, benchmark, watch, reproduce, design, identify, export, warm."""
 
 from itertools import count
 from pathlib import Path
@@ -283,6 +283,30 @@ def export(
         check_file(mjcf, overwrite, "--mjcf")
         mjcf.write_text(text, encoding="utf-8")
         typer.echo(f"The model is in {mjcf}.")
+
+
+@app.command()
+def warm(
+    robot: Annotated[
+        list[str] | None, typer.Option(help="Name of a robot, or path of a YAML file; may be repeated.")
+    ] = None,
+    task: Annotated[
+        list[str] | None, typer.Option(help="Name of a task, or path of a YAML file; may be repeated.")
+    ] = None,
+    casters: Annotated[
+        list[int] | None, typer.Option(help="Number of casters of some other robot; may be repeated.")
+    ] = None,
+) -> None:
+    """Compile ahead what robots and tasks need, those that come with the package unless others are named."""
+    with plain_errors("what was compiled is kept; the same command goes on from there"):
+        from .warm import read_pieces
+        from .warm import warm as run
+
+        pieces = read_pieces(robot or [], task or [], casters or [])
+        with progress(total=len(pieces), desc="warm", bar_format=PARTS_BAR) as show:
+            result = run(pieces, show)
+        there = result.pieces - result.compiled
+        typer.echo(f"{result.compiled} parts were compiled, {there} were there already; all are in {result.folder}.")
 
 
 if __name__ == "__main__":

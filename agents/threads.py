@@ -5,7 +5,6 @@ process the two wait for each other most of the time. Sums depend on how they ar
 repeats only with the same number of threads: it must not follow from the machine.
 """
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -29,8 +28,3 @@ def limited_to(threads: int) -> Iterator[None]:
     finally:
         torch.set_num_threads(before[0])
         set_threads(before[1])
-
-
-def usable_cores() -> int:
-    """Cores that this process may use: fewer than the machine has in containers and under schedulers."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

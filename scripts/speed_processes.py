@@ -11,7 +11,7 @@ from scripts.speed_timing import Row, at_most
 
 STATUS = Path("/proc/self/statm")  # where Linux tells how much memory a process has
 BIG = 65536  # robots whose memory is measured
-COMPILING = "caster_gym compiles"  # begins the message that must not be missing
+COMPILING = "caster_gym: compiling for 3 casters"  # begins the message that must not be missing
 
 IMPORT = "import time; t = time.perf_counter(); import caster_gym; print(time.perf_counter() - t)"
 FIRST_STEP = f"""

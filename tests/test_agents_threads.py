@@ -1,11 +1,9 @@
 """caster_gym.agents.threads: as many as are asked for, and no trace of it afterwards."""
 
-import os
-
 import pytest
 import torch
 
-from caster_gym.agents.threads import DEFAULT, limited_to, usable_cores
+from caster_gym.agents.threads import DEFAULT, limited_to
 from caster_gym.engines.threads import get_threads
 
 
@@ -34,10 +32,3 @@ def test_fewer_than_one_are_refused(count):
     with pytest.raises(ValueError, match=f"must be 1 or more, got {count}"), limited_to(count):
         pass
     assert used() == before
-
-
-def test_cores_are_those_of_this_process(monkeypatch):
-    """Not of the machine: containers and schedulers leave fewer."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3, 5}, raising=False)
-    monkeypatch.setattr(os, "cpu_count", lambda: 64)
-    assert usable_cores() == 2

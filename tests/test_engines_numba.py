@@ -1,21 +1,13 @@
-"""caster_gym.engines.numba_compiler, .lanes and .numba_fleet: the mechanics compiled, in batches, and its cache."""
-
-import json
-import os
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
+"""caster_gym.engines.numba_compiler, .lanes and .numba_fleet: the mechanics compiled, and in batches."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model, load_robot
-from caster_gym.engines import numba_compiler, numba_fleet
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.threads import BLOCKS_PER_SHARE
+from caster_gym.engines.threads import BLOCKS_PER_SHARE, get_threads, set_threads
 from caster_gym.engines.torch_model import TorchModel
 from tests.random_robots import random_robot
 
@@ -105,6 +97,21 @@ def test_batches_on_one_and_on_several_threads_are_equal():
     large.step(torques, STEP, 20)
     small.step(torques[:few], STEP, 20)
     assert_array_equal(small.state, large.state[:few])
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_the_number_of_threads_changes_no_bit(threads):
+    """Every robot is computed by one thread; how blocks are shared out leaves nothing behind."""
+    robots, (_, directions), torques = different_robots(MANY), random_states(7, MANY), random_torques(7, MANY)
+    before, states = get_threads(), []
+    for count in (1, threads):
+        set_threads(count)
+        fleet = Fleet(robots)
+        fleet.state = directions
+        fleet.step(torques, STEP, 20)
+        states.append(fleet.state)
+    set_threads(before)
+    assert_array_equal(*states)
 
 
 def test_many_steps_equal_single_ones():
@@ -201,92 +208,3 @@ def test_the_slowest_robot_decides_the_time_step():
     slow = quick.model_copy(update={"casters": tuple(c.model_copy(update={"trail": 1e-4}) for c in quick.casters)})
     with pytest.raises(ValueError, match=r"trail of 0\.0001 m"):
         Fleet([quick, slow]).step(np.zeros((2, 6)), STEP)
-
-
-COUNTS_OF_COMPILATION = """
-import json
-import numpy as np
-from caster_gym import load_robot
-from caster_gym.engines import numba_fleet
-robot = load_robot("chung2008")
-robot = robot.model_copy(update={"casters": robot.casters[:2]})
-numba_fleet.Fleet(robot, 2).step(np.zeros((2, 4)), 1e-3)
-stats = numba_fleet._compiled_step_blocks.stats
-print(json.dumps([sum(stats.cache_hits.values()), sum(stats.cache_misses.values())]))
-"""
-
-
-@pytest.fixture(scope="module")
-def compilations(tmp_path_factory):
-    """Hits and misses of the cache in the first process and in a second one."""
-    folder = tmp_path_factory.mktemp("cache")
-    places = {"XDG_CACHE_HOME": str(folder)}
-    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-
-    def run():
-        done = subprocess.run(
-            [sys.executable, "-c", COUNTS_OF_COMPILATION], env=kept | places, check=True, capture_output=True, text=True
-        )
-        return json.loads(done.stdout)
-
-    return run(), run(), folder
-
-
-def test_the_first_process_compiles(compilations):
-    assert compilations[0] == [0, 1]
-
-
-def test_a_second_process_compiles_nothing(compilations):
-    assert compilations[1] == [1, 0]
-
-
-def test_compiled_code_lies_in_the_cache_of_the_user(compilations):
-    assert list((compilations[2] / "caster_gym").rglob("*.nbc"))
-
-
-@pytest.fixture
-def package(tmp_path, monkeypatch):
-    """A package with the folders of caster_gym and one file in each."""
-    for folder in ("mechanics", "engines", "envs", "paths"):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "one.py").write_text("x = 1\n")
-    monkeypatch.setattr(numba_compiler, "_PACKAGE", tmp_path)
-    return tmp_path
-
-
-@pytest.mark.parametrize("folder", ["mechanics", "engines", "envs"])
-def test_a_changed_source_has_another_cache(package, folder):
-    """Numba looks only at the file of the function it compiles: functions that this one calls may have changed."""
-    before = numba_compiler._source_digest()
-    assert numba_compiler._source_digest() == before
-    (package / folder / "one.py").write_text("x = 2\n")
-    changed = numba_compiler._source_digest()
-    (package / folder / "one.py").rename(package / folder / "two.py")
-    assert len({before, changed, numba_compiler._source_digest()}) == 3
-
-
-def test_sources_that_are_not_compiled_keep_the_cache(package):
-    before = numba_compiler._source_digest()
-    (package / "paths" / "one.py").write_text("x = 2\n")
-    assert numba_compiler._source_digest() == before
-
-
-def test_the_cache_goes_where_it_is_told_and_where_it_can(tmp_path, monkeypatch):
-    assert numba_compiler._cache_root(str(tmp_path / "chosen")) == tmp_path / "chosen"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
-    assert numba_compiler._cache_root("") == tmp_path / "user" / "caster_gym"
-    (tmp_path / "file").write_text("no folder can be made in a file")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert numba_compiler._cache_root("") == Path(tempfile.gettempdir()) / "caster_gym"
-
-
-def test_compiling_is_announced_until_it_has_happened(package, monkeypatch, capsys):
-    monkeypatch.setattr(numba_compiler._SETTINGS, "CACHE_DIR", str(package / "cache"))
-    step = numba_fleet._compiled_step_blocks
-    numba_compiler.announce_compilation(step, "the fleet")
-    assert "caster_gym compiles the fleet, once on this machine" in capsys.readouterr().err
-    folder = package / "cache" / numba_compiler._source_digest() / "engines_0123"
-    folder.mkdir(parents=True)
-    (folder / f"numba_fleet.{step.__name__}-1.py311.nbi").touch()
-    numba_compiler.announce_compilation(step, "the fleet")
-    assert capsys.readouterr().err == ""

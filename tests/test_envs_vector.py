@@ -10,7 +10,7 @@ from gymnasium.wrappers import TimeLimit
 from numpy.testing import assert_array_equal
 
 from caster_gym.engines.lanes import LANES
-from caster_gym.engines.threads import BLOCKS_PER_SHARE
+from caster_gym.engines.threads import BLOCKS_PER_SHARE, get_threads, set_threads
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 
 TASK = {"corridor": 0.12, "path": {"shape": "circle", "radius": 0.5}}  # random torques leave it, sooner or later
@@ -77,8 +77,11 @@ def test_a_batch_equals_single_environments(mode, count, steps):
     assert ends >= 3
 
 
-def test_a_batch_on_several_threads_equals_single_environments():
+def test_a_batch_on_several_threads_equals_single_environments(request):
     """Large enough for two threads, and one robot short of full blocks."""
+    before = get_threads()
+    set_threads(2)
+    request.addfinalizer(lambda: set_threads(before))
     count = 2 * BLOCKS_PER_SHARE * LANES - 1
     ours, theirs = batch(count, "SameStep"), singles(count, AutoresetMode.SAME_STEP)
     assert_same(ours.reset(seed=SEED), theirs.reset(seed=SEED))

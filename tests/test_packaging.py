@@ -164,3 +164,20 @@ def test_version_is_told_once_and_for_all():
     import caster_gym
 
     assert caster_gym.__version__ == PROJECT["project"]["version"]
+
+
+def bounds():
+    """Lowest version of each library in pyproject.toml, without the tools for style and types."""
+    project = PROJECT["project"]
+    extras = [line for name, lines in project["optional-dependencies"].items() if name != "dev" for line in lines]
+    lines = [*project["dependencies"], *(line for line in extras if not line.startswith("caster_gym["))]
+    return {name.lower(): lowest for name, _, lowest in (line.partition(">=") for line in lines)}
+
+
+def test_the_lowest_versions_tested_are_those_declared():
+    """`make lowest` installs constraints-lowest.txt, whose versions may have more zeros than the bounds."""
+    text = (ROOT / "constraints-lowest.txt").read_text(encoding="utf-8")
+    pins = dict(line.lower().split("==") for line in text.splitlines() if not line.startswith("#"))
+    assert pins.keys() == bounds().keys()
+    for name, lowest in bounds().items():
+        assert pins[name] == lowest or pins[name].removeprefix(lowest).strip(".0") == "", (name, lowest, pins[name])

@@ -12,6 +12,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from caster_gym.engines.compilation import Work
 from caster_gym.engines.numba_compiler import INLINE, compiled
 from caster_gym.engines.threads import over_blocks
 from caster_gym.mechanics.caster import rate_rows
@@ -200,5 +201,9 @@ def _means(first: int, end: int, grams: Any, weights: Any, ends: Any, means: Any
         means[i] = _compiled_mean(grams[i], weights, ends)
 
 
+def _described(_types: tuple[Any, ...]) -> Work:
+    return Work("means of the isotropy index", 2.0)
+
+
 _compiled_mean = compiled(_mean)
-_compiled_means = compiled(_means)
+_compiled_means = compiled(_means, _described)

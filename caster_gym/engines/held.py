@@ -9,6 +9,7 @@ from typing import Any
 from numba import types
 from numba.experimental import structref
 
+from caster_gym.engines.compilation import Work
 from caster_gym.engines.numba_compiler import compiled
 
 
@@ -32,4 +33,8 @@ def _holding(content: Any) -> Any:
     return Held(content)
 
 
-_hold = compiled(_holding)
+def _described(_types: tuple[Any, ...]) -> Work:
+    return Work("robots that are stepped one by one", 1.0)
+
+
+_hold = compiled(_holding, _described)

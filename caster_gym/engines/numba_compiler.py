@@ -1,18 +1,12 @@
-"""Teaches Numba the generic mechanics, and keeps what it compiles on disk.
+"""Teaches Numba the generic mechanics.
 
 The number of casters is the length of a tuple, hence part of a type: loops over casters unroll while compiling, every
 intermediate value is a register, and a loop over the robots of a block becomes SIMD instructions. Arithmetic stays
 strict IEEE, so that one robot alone and the same robot in a batch agree to the last bit.
 """
 
-import hashlib
 import math
-import os
-import sys
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -21,6 +15,7 @@ import numpy as np
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
+from caster_gym.engines.compilation import Describe, share
 from caster_gym.engines.numba_loops import INLINE
 from caster_gym.mechanics import (
     actuation,
@@ -39,10 +34,8 @@ from caster_gym.mechanics import (
     separation,
 )
 
-__all__ = ["INLINE", "announce_compilation", "borrowed", "compiled", "teach"]
+__all__ = ["INLINE", "borrowed", "compiled", "teach"]
 
-_PACKAGE = Path(__file__).resolve().parent.parent
-_SETTINGS: Any = numba.config  # makes its attributes at run time
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
 _LOOPS_AND_CHOICES |= {
     scalars.flatten,
@@ -62,50 +55,14 @@ def teach(module: ModuleType) -> None:
             register_jitable(**INLINE)(function)
 
 
-def compiled(function: Callable[..., Any]) -> Any:
-    """The function compiled at its first call, or read from the cache of an earlier process."""
-    with _cache_folder():
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+def compiled(function: Callable[..., Any], describe: Describe | None = None) -> Any:
+    """The function compiled at its first call, or read from the cache of an earlier process.
 
-
-def announce_compilation(function: Callable[..., Any], work: str) -> None:
-    """Say on stderr that compiling is ahead, unless the cache holds the compiled function already."""
-    pattern = f"*{function.__name__}-*.nbi"
-    if not any((_cache_root(_SETTINGS.CACHE_DIR) / _source_digest()).rglob(pattern)):
-        print(f"caster_gym compiles {work}, once on this machine; this takes 15 to 40 s", file=sys.stderr)
-
-
-@contextmanager
-def _cache_folder() -> Iterator[None]:
-    """Numba's cache in a folder of its own for each version of our sources: Numba itself watches one file only."""
-    previous = _SETTINGS.CACHE_DIR
-    _SETTINGS.CACHE_DIR = str(_cache_root(previous) / _source_digest())
-    try:
-        yield
-    finally:
-        _SETTINGS.CACHE_DIR = previous
-
-
-def _cache_root(chosen: str) -> Path:
-    """NUMBA_CACHE_DIR if set, else the user's cache folder, else a temporary one."""
-    if chosen:
-        return Path(chosen)
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "caster_gym"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.gettempdir()) / "caster_gym"
-    return folder if os.access(folder, os.W_OK) else Path(tempfile.gettempdir()) / "caster_gym"
-
-
-def _source_digest() -> str:
-    """Short hash of every source file whose code may be compiled; what is Torch's is not."""
-    digest = hashlib.sha256()
-    for folder in ("mechanics", "engines", "envs"):
-        for file in sorted((_PACKAGE / folder).glob("*.py")):
-            if not file.name.startswith("torch_"):
-                digest.update(file.name.encode() + file.read_bytes())
-    return digest.hexdigest()[:16]
+    describe: tells what is compiled, from the types of the arguments. None for what only compiled code calls.
+    """
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    share(dispatcher, function, describe)
+    return dispatcher
 
 
 def _borrowed(_typing: Any, array: Any) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.engines.compilation import Work
 from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, reach_of, settled, worth_measuring
 from caster_gym.engines.lanes import (
     BODY_ROWS,
@@ -132,10 +133,17 @@ def _step_blocks(
         _compiled_step_block(blocks[i], here, steps, h, hull, obstacles, casters)
 
 
+def _described(types: tuple[Any, ...]) -> Work:
+    *_, hull, _, casters = types
+    among = hasattr(hull, "types")  # else it is None
+    around = " among obstacles" if among else ""
+    return Work(f"{len(casters)} casters (mechanics{around})", (2.0 if among else 1.0) * (2.0 + len(casters)))
+
+
 _compiled_careful_step = compiled(_careful_step)
 _compiled_step_block = compiled(_step_block)
-_compiled_step_one = compiled(_step_one)
-_compiled_step_blocks = compiled(_step_blocks)
+_compiled_step_one = compiled(_step_one, _described)
+_compiled_step_blocks = compiled(_step_blocks, _described)
 
 
 class Fleet:

@@ -1,8 +1,8 @@
 """Compiled code on several cores: blocks of robots shared out over threads that release the interpreter's lock.
 
 Threads that sleep while they wait keep their speed beside other busy processes; spinning ones, as OpenMP's, then lose
-most of it. How many are used is NUMBA_NUM_THREADS, else the number of cores, until `set_threads` is called. Numba's own
-pool is left alone: waking it would change the number of threads that Torch uses.
+most of it. How many are used follows from the environment, see `default_threads`, until `set_threads` is called. The
+pool of Numba is left alone: waking it would change the number of threads that Torch uses.
 """
 
 import os
@@ -12,15 +12,20 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 from typing import Any
 
+from caster_gym.engines.cores import default_threads
+
 BLOCKS_PER_SHARE = 4  # least, since waking a thread costs about as much as stepping so many blocks
 SHARES_PER_THREAD = 4  # a thread that wakes late, or beside a busy process, leaves more of them to the others
 
-_count = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+_count = 0  # until the first use: schedulers set affinity and environment after a process has started, too
 _pool: ThreadPoolExecutor | None = None
 
 
 def get_threads() -> int:
     """Greatest number of threads that a batch is stepped with."""
+    global _count
+    if _count == 0:
+        _count = default_threads()
     return _count
 
 
@@ -41,8 +46,9 @@ def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> N
     After an error, or an interrupt, those that nobody has begun are left out, and nothing goes on behind the caller's
     back.
     """
-    shares = min(_count * SHARES_PER_THREAD, blocks // BLOCKS_PER_SHARE)
-    if _count < 2 or shares < 2:
+    count = _count or get_threads()
+    shares = min(count * SHARES_PER_THREAD, blocks // BLOCKS_PER_SHARE)
+    if count < 2 or shares < 2:
         function(0, blocks, *arguments)
         return
     bounds = [blocks * i // shares for i in range(shares + 1)]
@@ -52,7 +58,7 @@ def over_blocks(function: Callable[..., Any], blocks: int, *arguments: Any) -> N
         for first, end in untaken:
             function(first, end, *arguments)
 
-    others = [_threads().submit(work) for _ in range(min(_count, shares) - 1)]
+    others = [_threads().submit(work) for _ in range(min(count, shares) - 1)]
     try:
         work()
     finally:

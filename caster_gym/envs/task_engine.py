@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.engines.compilation import compilations, included
 from caster_gym.engines.held import Held
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.memory import check_memory
-from caster_gym.engines.numba_compiler import announce_compilation
 from caster_gym.engines.recycling import Shelf
 from caster_gym.engines.threads import over_blocks
 from caster_gym.engines.time_step import check_rows, check_time_step
@@ -90,7 +90,6 @@ class TaskEngine:
 
     def __init__(self, robot: Robot, plan: Plan, pace: Pace, observed: ObservationLayout, count: int) -> None:
         check_time_step(robot, pace.time_step, pace.substeps)
-        announce_compilation(kernel.restart, "the environment")
         self.robot, self.plan, self.layout, self.count = robot, plan, observed, count
         self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
         self._pace = pace
@@ -128,9 +127,8 @@ class TaskEngine:
             substeps=pace.substeps,
             time_step=pace.time_step,
         )
-        if count == 1:
-            self._results = np.zeros(3)
-            self._held = Held((self._world, self._desk, self._results, self._sizes))
+        self._results = np.zeros(3)  # of a robot alone
+        self._held: Held | None = None  # made when it is needed, since that may have to compile
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
@@ -152,7 +150,10 @@ class TaskEngine:
         outcome = self._empty() if into is None else into
         views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
+        before = compilations()
         kernel.restart(selected, paths, self._world, self._spread, views, self._desk, self._sizes)
+        if compilations() > before:
+            self._compile_step()
         if into is None:
             self._reports = self._reports.reshape(self._report_rows, -1).copy()
             self._reports[:, selected] = outcome.reports[:, selected]
@@ -190,11 +191,27 @@ class TaskEngine:
         """
         observation = np.empty(self._observation_size, dtype=np.float32)
         report = np.empty(self._report_rows)
-        if not kernel.step_single(self._held, action, observation, report):
+        held = self._held if self._held is not None else self._hold()
+        if not kernel.step_single(held, action, observation, report):
             raise ValueError(f"action must hold numbers, got {action}")
         self._reports = report
         reward, failed, late = self._results.tolist()
         return observation, reward, failed > 0.0, late > 0.0, report
+
+    def _hold(self) -> Held:
+        self._held = Held((self._world, self._desk, self._results, self._sizes))
+        return self._held
+
+    def _compile_step(self) -> None:
+        """Compile the step as well, by a call that does nothing, so that whoever waits does so once."""
+        nothing, action = self._empty(), np.full(len(self.robot.driven), np.nan, dtype=np.float32)
+        with included():
+            if self.count == 1:
+                kernel.step_single(self._hold(), action, nothing.observations[0], nothing.reports[:, 0].copy())
+            else:
+                views = layout.Views(nothing.observations, nothing.reports, np.zeros((3, self.count)))
+                actions = np.zeros((self.count, len(action)), dtype=np.float32)
+                kernel.step_blocks(0, 0, self._world, actions, views, self._sizes)
 
     def _empty(self) -> Outcome:
         size, count = self.layout.size, self.count

@@ -12,7 +12,7 @@ from numba.extending import register_jitable
 from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, reach_of, settled, worth_measuring
 from caster_gym.engines.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
-from caster_gym.envs import randomness
+from caster_gym.envs import compilation, randomness
 from caster_gym.envs.block_layout import (
     NEIGHBOUR_ROWS,
     RECORD_ROWS,
@@ -379,6 +379,6 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
 careful_step = compiled(_careful_step)
 look_at_one = compiled(_look_at_one)
 step_block = compiled(_step_block)
-step_single = compiled(_step_single)
-step_blocks = compiled(_step_blocks)
-restart = compiled(_restart)
+step_single = compiled(_step_single, compilation.of_single_step)
+step_blocks = compiled(_step_blocks, compilation.of_batch_step)
+restart = compiled(_restart, compilation.of_restart)

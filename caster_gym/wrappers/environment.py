@@ -1,7 +1,7 @@
 """Environments with features: one robot, or a batch, from the same features."""
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import gymnasium as gym
 import numpy as np
@@ -17,6 +17,10 @@ from caster_gym.wrappers.stack import Stack
 
 Env: TypeAlias = gym.Env[Any, Any]
 Batch: TypeAlias = VectorEnv[Any, Any, Any]
+if TYPE_CHECKING:
+    AnyVectorWrapper: TypeAlias = VectorWrapper[Any, Any, Any, Any, Any]
+else:
+    AnyVectorWrapper = VectorWrapper  # takes no parameters in Gymnasium 1.2
 
 _BETWEEN = (OrderEnforcing, PassiveEnvChecker, TimeLimit)  # wrappers that change no observation, reward or action
 _ONLY = np.zeros(1, dtype=np.int64)
@@ -55,7 +59,7 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         return self._stack.observe(observation[None])[0], reward, terminated, truncated, info
 
 
-class FeatureVectorEnv(VectorWrapper[Any, Any, Any, Any, Any]):
+class FeatureVectorEnv(AnyVectorWrapper):
     """A batch of caster_gym with features, equal bit for bit to a SyncVectorEnv of `FeatureEnv`; see `wrap`."""
 
     def __init__(self, env: Batch, features: Sequence[Feature] = ()) -> None:
