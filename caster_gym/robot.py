@@ -1,5 +1,6 @@
 """A robot on powered casters: what it is made of, checked, with units. SI throughout; B is the body frame."""
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -191,10 +192,12 @@ def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tupl
     return tuple(joints)
 
 
-def load_robot(name: str | Path | Robot) -> Robot:
-    """A robot that comes with the package, by its name, or one from a YAML file of your own."""
+def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
+    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one."""
     if isinstance(name, Robot):
         return name
+    if isinstance(name, Mapping):
+        return parse(Robot, name, "the robot")
     path = Path(name).expanduser()
     if path.suffix not in (".yaml", ".yml"):
         folder = Path(str(files("caster_gym.configs"))) / "robots"

@@ -5,7 +5,8 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from caster_gym.envs.caster_env import CasterEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv, check_counts
+from caster_gym.envs.caster_vector_env import CasterVectorEnv
+from caster_gym.envs.inputs import check_counts
 from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine
 
 

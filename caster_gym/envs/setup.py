@@ -18,6 +18,7 @@ from caster_gym.envs import follow_task, track_task
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.following import FollowTerms
 from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.inputs import check_keywords
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.task import Task
 from caster_gym.envs.task_engine import Pace, Plan, TaskEngine, joined
@@ -28,12 +29,20 @@ from caster_gym.paths.course import build_courses
 from caster_gym.paths.specification import AnyPath, PathSpecification, build_trajectories, read_paths
 from caster_gym.robot import Robot, load_robot
 
-RobotLike: TypeAlias = str | Path | Robot
+RobotLike: TypeAlias = str | Path | Robot | Mapping[str, Any]
 PathLike: TypeAlias = (
     str | Mapping[str, Any] | PathSpecification | Sequence[str | Mapping[str, Any] | PathSpecification]
 )
 ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
 Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
+
+KEYWORDS = (
+    "robot",
+    "path",
+    "actuation",
+    "arena",
+    "render_mode",
+)  # of the environments, beside the fields of their task
 
 
 def track_engine(
@@ -49,6 +58,7 @@ def track_engine(
 
     longest: greatest number of control periods of an episode.
     """
+    check_keywords(fields, (*KEYWORDS, *TrackTask.model_fields), "CasterTrack")
     chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
     plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
@@ -66,6 +76,7 @@ def follow_engine(
     longest: int | None = None,
 ) -> tuple[TaskEngine, FollowTask]:
     """The same for the following task."""
+    check_keywords(fields, (*KEYWORDS, *FollowTask.model_fields), "CasterFollow")
     chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
     plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
