@@ -9,6 +9,7 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from caster_gym.envs.drawing import Renderer, checked_mode
+from caster_gym.envs.infos import named
 from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
 from caster_gym.envs.setup import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
@@ -21,7 +22,10 @@ _ONLY, _CHOSEN = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.bool_)
 
 
 class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
-    """What the environments of single robots share; a subclass makes the engine of its task."""
+    """What the environments of single robots share; a subclass makes the engine of its task.
+
+    Copies, by `copy`, `pickle` or `cloudpickle`, go on as the original does, to the last bit, and independently of it.
+    """
 
     # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
@@ -30,7 +34,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.engine, self.task, self.robot = engine, task, engine.robot
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
-        self._action_shape = self.action_space.shape
+        self._action_shape, self._terms = self.action_space.shape, engine.plan.terms
         self.render_mode = checked_mode(render_mode, self.metadata)
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
         self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
@@ -65,7 +69,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         observation, reward, terminated, truncated, report = self.engine.step_alone(action)
         if self.render_mode == "human":
             self.render()
-        return observation, reward, terminated, truncated, self.engine.info(report)
+        return observation, reward, terminated, truncated, named(report, self._terms)
 
     def __copy__(self) -> Self:
         """As independent as a deep copy: two environments around one engine would move the same robot."""

@@ -68,7 +68,16 @@ class CasterTrackEnv(CasterEnv):
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:
     the trajectory is over. Success does not end an episode.
 
-    **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad.
+    **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad,
+    unless `reset(options={…})` says otherwise; what it leaves open, and all later episodes, are drawn as without it:
+
+    | option | meaning | unit |
+    |---|---|---|
+    | path | index of the path in the pool | – |
+    | time | place along the trajectory, to the nearest control period; the start is drawn beside it | s |
+    | pose | x, y and heading in W; inside the corridor around the reference and free of obstacles | m, m, rad |
+    | twist | vx, vy, ω in B, which wheels and motors can reach | m/s, m/s, rad/s |
+    | steering | angle δ_i of each caster | rad |
 
     robot: name, YAML file or Robot. path: name, specification or several (`caster_gym.paths`), of which each episode
     draws one. actuation: "all" or the names of the driven joints; by default the robot's own. arena: obstacles

@@ -20,8 +20,9 @@ from caster_gym.envs.following import FollowTerms
 from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.inputs import check_keywords
 from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.plan import Pace, Plan, joined
 from caster_gym.envs.task import Task
-from caster_gym.envs.task_engine import Pace, Plan, TaskEngine, joined
+from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.mechanics.separation import Surroundings

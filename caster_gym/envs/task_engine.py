@@ -1,7 +1,7 @@
 """Every task for any number of robots, moved by compiled code; the environments are thin faces of this."""
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -15,33 +15,17 @@ from caster_gym.engines.recycling import Shelf
 from caster_gym.engines.threads import over_blocks
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
-from caster_gym.envs.block_layout import (
-    CONDITIONING,
-    FIRST_POSE,
-    FIRST_RECORD,
-    FIRST_SITUATION,
-    FIRST_TERM,
-    FIXED_REPORT_ROWS,
-    HEADING_SIN,
-    LEFT_CORRIDOR,
-    NOT_FINITE,
-    POSITION_ERROR,
-    TOUCHED,
-    TRACTION_USE,
-)
-from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.block_layout import FIXED_REPORT_ROWS
+from caster_gym.envs.guides import Courses
+from caster_gym.envs.infos import named
 from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.plan import Pace, Plan
 from caster_gym.envs.scene import Scene, draw_scene
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
-from caster_gym.mechanics.separation import Obstacles, Surroundings
+from caster_gym.mechanics.separation import Obstacles
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
-
-_TERMS = slice(FIRST_TERM, FIRST_POSE)
-_TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
-_POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIRST_POSE + 4 : FIRST_POSE + 8]
-_IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
 
 
 class Outcome(NamedTuple):
@@ -52,31 +36,6 @@ class Outcome(NamedTuple):
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
     reports: NDArray[np.float64]  # (quantities, robots)
-
-
-class Plan(NamedTuple):
-    """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
-
-    guide: Timetable | Courses
-    names: tuple[str, ...]  # of the paths
-    tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
-    terms: tuple[str, ...]  # names of the reward's terms
-    around: Surroundings
-    arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
-
-    def __deepcopy__(self, _memo: dict[int, Any]) -> Self:
-        """Itself: nobody writes into its tables, which the environments of a process share."""
-        return self
-
-
-class Pace(NamedTuple):
-    """What the engine needs to know of a task."""
-
-    substeps: int
-    time_step: float  # [s]
-    corridor: float  # [m]
-    start_offset: float  # [m]
-    start_turn: float  # [rad]
 
 
 class TaskEngine:
@@ -97,10 +56,8 @@ class TaskEngine:
         self.spread = np.array([pace.start_offset, pace.start_turn])  # [m], [rad] greatest displacements of a start
         self.corridor, self.control_period = pace.corridor, pace.substeps * pace.time_step  # [m], [s]
         self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count
-        self._told: NDArray[np.float64] | None = (
-            None  # a batch's latest reports once it is drawn, which nobody else has
-        )
-        self._late: NDArray[np.int64] | None = None  # (robots,) clocks with which episodes began, unless all were 0
+        self._told: NDArray[np.float64] | None = None  # latest reports of a batch that is drawn, copied for pictures
+        self._late: NDArray[np.int64] | None = None  # (robots,) clocks at which episodes began, unless all were 0
         kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
         self._build(
             np.zeros((1, layout.desk_rows(self._sizes) * LANES) if count == 1 else (block_count(count), kept * LANES)),
@@ -141,9 +98,8 @@ class TaskEngine:
             Shelf((3, count), np.float64),
         )
         self._observation_size = self.layout.size
-        if count == 1:
-            self._results = np.zeros(3)
-            self._held = Held((self._world, self._desk, self._results, self._sizes))
+        self._results = np.zeros(3)  # of a robot alone
+        self._held: Held | None = None  # made when it is needed, since that may have to compile
 
     def _desk_parameters(self, desk: NDArray[np.float64]) -> NDArray[np.float64]:
         kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
@@ -235,10 +191,15 @@ class TaskEngine:
         """
         observation = np.empty(self._observation_size, dtype=np.float32)
         report = np.empty(self._report_rows)
-        if not kernel.step_single(self._held, action, observation, report):
+        held = self._held if self._held is not None else self._hold()
+        if not kernel.step_single(held, action, observation, report):
             raise ValueError(f"action must hold numbers, got {action}")
         reward, failed, late = self._results.tolist()
         return observation, reward, failed > 0.0, late > 0.0, report
+
+    def _hold(self) -> Held:
+        self._held = Held((self._world, self._desk, self._results, self._sizes))
+        return self._held
 
     def look(self, progress_stays: bool = True) -> Outcome:
         """What all robots see and report where they are now, as at a start: after no time, without torques.
@@ -351,32 +312,8 @@ class TaskEngine:
         return np.array(self._world.clocks[1])
 
     def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
-        """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
-
-        Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
-        """
-        row: Any = reports if reports.ndim > 1 else reports.tolist()  # numbers of one robot are Python's own
-        columns = reports.T
-        return {
-            "position_error": row[POSITION_ERROR],
-            "heading_error": row[HEADING_SIN],
-            "reward_terms": dict(zip(self.plan.terms, row[_TERMS], strict=False)),
-            "torque": columns[_TORQUES],
-            "power": row[FIRST_RECORD],
-            "traction_use": row[TRACTION_USE],
-            "conditioning": row[CONDITIONING],
-            "pose": columns[_POSE],
-            "reference_pose": columns[_REFERENCE_POSE],
-            "progress": row[FIRST_SITUATION],
-            "progress_share": row[FIRST_SITUATION + 1],
-            "clearance": row[FIRST_SITUATION + 2],
-            "impacts": row[FIRST_RECORD + 6],
-            "impulse": columns[_IMPULSE],
-            "normal_impulse": row[FIRST_RECORD + 3],
-            "left_corridor": row[LEFT_CORRIDOR] > 0.0,
-            "not_finite": row[NOT_FINITE] > 0.0,
-            "touched": row[TOUCHED] > 0.0,
-        }
+        """Named quantities of all robots, or one; see `caster_gym.envs.infos`."""
+        return named(reports, self.plan.terms)
 
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
@@ -408,10 +345,3 @@ class TaskEngine:
     def _obstacles_beside(self, path: int) -> Obstacles:
         around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
         return around._replace(radii=around.radii[near:end], spans=around.spans[near:end])
-
-
-def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """All tables of paths in one (rows, columns), with each one's first and last row (paths, 2)."""
-    lengths = np.array([len(table) for table in tables])
-    ends = np.cumsum(lengths)
-    return np.ascontiguousarray(np.concatenate(tables)), np.stack([ends - lengths, ends - 1], axis=1).astype(np.int64)
