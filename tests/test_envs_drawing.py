@@ -92,19 +92,20 @@ def test_a_grid_shows_up_to_sixteen_robots():
 def test_a_batch_draws_each_robot_as_its_single_environment(kind, single):
     """To the last pixel, on paths of their own, with what has happened since the reset; SyncVectorEnv agrees."""
     paths = {"path": [PATH, "lemniscate"], "render_mode": "rgb_array"}
-    ours, theirs = kind(3, **paths), SyncVectorEnv([lambda: single(**paths)] * 3)
-    for env in (ours, theirs):
-        env.reset(seed=[0, 1, 0], options={"path": 0})
+    ours, theirs, alone = kind(3, **paths), SyncVectorEnv([lambda: single(**paths)] * 3), kind(1, **paths)
+    for env in (ours, theirs, alone):
+        env.reset(seed=[0, 1, 0][: env.num_envs], options={"path": 0})
     for step in range(6):
         action = np.full((3, 6), 0.1 * step, dtype=np.float32)
-        for env in (ours, theirs):
-            env.step(action)
+        for env in (ours, theirs, alone):
+            env.step(action[: env.num_envs])
         if step % 3 == 2:
             frames, expected = ours.render(), theirs.render()
             assert type(frames) is type(expected) is tuple
             assert len(frames) == 3
             for frame, other in zip(frames, expected, strict=True):
                 np.testing.assert_array_equal(frame, other)
+            np.testing.assert_array_equal(alone.render()[0], frames[0])
     np.testing.assert_array_equal(frames[0], frames[2])
     assert (frames[0] != frames[1]).any()
     ours.close()

@@ -178,6 +178,8 @@ class TaskEngine:
         over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
         if self._told is not None:
             self._told = reports.copy()
+        if self.count == 1:
+            self._desk_report[:] = reports[:, 0]
         truncated = results[2] > 0.0 if self._late is None else self._over(self._late)
         return Outcome(observations, results[0], results[1] > 0.0, truncated, reports)
 
@@ -339,8 +341,13 @@ class TaskEngine:
         """The latest report of a robot, from where nobody else can have changed it."""
         if self._told is not None:
             return self._told[:, robot].copy()
+        return self._desk_report.copy()
+
+    @property
+    def _desk_report(self) -> NDArray[np.float64]:
+        """Where the latest report of a robot alone stands."""
         row = layout.report_row(self._sizes)
-        return self._desk.reshape(-1, LANES)[row : row + self._report_rows, 0].copy()
+        return self._desk.reshape(-1, LANES)[row : row + self._report_rows, 0]
 
     def _obstacles_beside(self, path: int) -> Obstacles:
         around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
