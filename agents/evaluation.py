@@ -10,7 +10,7 @@ from caster_gym.envs.caster_follow import CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.caster_vector_env import CasterVectorEnv
 from caster_gym.envs.guides import Courses
-from caster_gym.envs.task_engine import Plan
+from caster_gym.envs.plan import Plan
 from caster_gym.paths.time_law import row_times
 from caster_gym.wrappers import Feature, FeatureVectorEnv, wrap
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.envs.guides import Courses
-from caster_gym.envs.task_engine import Plan
+from caster_gym.envs.plan import Plan
 from caster_gym.render.palette import SERIES as COLOURS
 
 from .evaluation import Episodes

@@ -29,8 +29,9 @@ class CasterVecEnv(VecEnv):
         self._errors = np.zeros(batch.num_envs)
         self._lengths = np.zeros(batch.num_envs, dtype=np.int64)
         self._actions: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
-        self.render_mode = batch.render_mode
         super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)
+        # SB3 knows no grid, and puts the images that it gets side by side
+        self.render_mode = "rgb_array" if batch.render_mode == "grid" else batch.render_mode
 
     @property
     def actions(self) -> int:
@@ -47,8 +48,8 @@ class CasterVecEnv(VecEnv):
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions for `step_wait`."""
-        self._actions = actions
+        """Keep a copy of the actions for `step_wait`."""
+        self._actions = np.array(actions)
 
     def step_wait(self) -> VecEnvStepReturn:
         """Observations, float32 rewards, dones and infos of one control period."""
@@ -100,8 +101,11 @@ class CasterVecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """One picture of the first robots in a grid, or None where the batch draws none."""
-        return [bare(self.batch).render() if self.render_mode == "rgb_array" else None]
+        """A frame of each robot, one of the grid if the batch draws that, or None where it draws none."""
+        if self.render_mode != "rgb_array":
+            return [None] * self.num_envs
+        drawn = bare(self.batch).render()
+        return list(drawn) if isinstance(drawn, tuple) else [drawn]
 
     def _get_indices(self, indices: VecEnvIndices) -> Iterable[int]:
         return super()._get_indices(indices)

@@ -12,6 +12,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
+from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from caster_gym.agents.sb3_environment import CasterVecEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
@@ -233,3 +234,31 @@ def test_what_features_add_is_learned_from():
         sums += [step[1] for step in told]
     assert (sums[1] > sums[0] + 4 * 8.0).all()  # a gaussian of at most 7 cm over 1 m is worth over 0.98
     assert [info["episode"]["r"] for info in told[1][3]] == pytest.approx(sums[1].tolist(), rel=1e-6)
+
+
+def test_actions_are_those_of_the_call():
+    """Not what becomes of their array until the step is waited for; what was handed out may be written into as well."""
+    ours, theirs = native(), native()
+    for env in (ours, theirs):
+        env.seed(3)
+        env.reset()[:] = 0.0 if env is ours else 1.0
+    actions = np.full((COUNT, 6), 0.3, dtype=np.float32)
+    theirs.step_async(actions.copy())
+    ours.step_async(actions)
+    actions[:] = 0.0
+    mine, other = ours.step_wait(), theirs.step_wait()
+    assert_array_equal(mine[0], other[0])
+    assert_array_equal(mine[1], other[1])
+
+
+def test_sb3_films_all_robots_or_their_grid():
+    """Side by side from frames of their own, or the one image that a grid is."""
+    for mode, count in (("rgb_array", COUNT), ("grid", 1)):
+        env = native(render_mode=mode)
+        env.reset()
+        assert env.render_mode == "rgb_array"
+        images = env.get_images()
+        assert len(images) == count
+        assert all(image.shape == images[0].shape for image in images)
+        assert_array_equal(env.render("rgb_array"), tile_images(images))
+    assert native().get_images() == [None] * COUNT

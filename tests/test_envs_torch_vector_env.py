@@ -162,7 +162,7 @@ def test_bad_input_is_refused():
         TorchVectorEnv("track", 2, device="cuda:99")
     with pytest.raises(ValueError, match=r"a batch of 10,000,000,000,000 robots needs at least .* GiB of memory"):
         TorchVectorEnv("track", 10**13, path=PATHS)
-    with pytest.raises(ValueError, match="a batch needs 1 robot or more, got 0"):
+    with pytest.raises(ValueError, match="num_envs must be 1 or more, got 0"):
         TorchVectorEnv("track", 0, path=PATHS)
     with pytest.raises(ValueError, match="corridoor"):
         TorchVectorEnv("track", 2, path=PATHS, corridoor=1.0)

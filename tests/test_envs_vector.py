@@ -151,6 +151,69 @@ def test_changing_what_was_returned_changes_nothing():
         _spoil(results[0])
 
 
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_a_reset_of_some_does_not_show_what_was_written_into_the_observations(mode):
+    """The others' entries are what they see, not what has become of an array that was handed out."""
+    env, clean = batch(3, mode), batch(3, mode)
+    for one in (env, clean):
+        one.reset(seed=SEED)
+    for step in range(3):
+        results = [one.step(np.full((3, 6), 0.2 * step, dtype=np.float32)) for one in (env, clean)]
+    results[0][0][:] = 0.0
+    mask = np.array([False, True, False])
+    shown, expected = (one.reset(options={"reset_mask": mask.copy()})[0] for one in (env, clean))
+    assert_array_equal(shown, expected)
+    assert_array_equal(shown[~mask], results[1][0][~mask])
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_masks_of_infos_are_arrays_of_their_own(mode):
+    """No two share memory, nor does the batch look at one again."""
+    env = batch(3, mode)
+    _, infos = env.reset(seed=SEED)
+    everything = [_masks(infos)]
+    for _, actions in zip(range(LONGEST), random_actions(env.action_space, 5), strict=False):
+        *_, terminated, truncated, infos = env.step(actions)
+        everything.append(_masks(infos))
+        if mode is AutoresetMode.DISABLED and (terminated | truncated).any():
+            everything.append(_masks(env.reset(options={"reset_mask": terminated | truncated})[1]))
+    assert max(len(masks) for masks in everything) >= 24  # a mask for each quantity and each term
+    for masks in everything:
+        for i, mask in enumerate(masks):
+            mask[:] = False
+            mask[0] = True
+            assert not any(other.tolist() == [True, False, False] for other in masks[i + 1 :] if other.sum() != 1)
+            assert not any(np.shares_memory(mask, other) for other in masks[i + 1 :])
+
+
+def test_seeds_and_generators_are_those_of_gymnasiums_own_batch():
+    """Tuples with one entry a robot, in the state that the resets have left them in."""
+    ours, theirs = batch(3, AutoresetMode.DISABLED), singles(3, AutoresetMode.DISABLED)
+    mask = np.array([False, True, False])
+    resets = [{"seed": 7}, {}, {"seed": [1, None, 3]}, {"seed": 20, "options": {"reset_mask": mask}}]
+    for how in resets:
+        for env in (ours, theirs):
+            env.reset(**copy.deepcopy(how))
+        assert ours.np_random_seed == theirs.np_random_seed
+        assert [one.bit_generator.state for one in ours.np_random] == [
+            one.bit_generator.state for one in theirs.np_random
+        ]
+    drawn = [one.random() for one in ours.np_random]
+    assert [one.random() for one in ours.np_random] != drawn  # they are kept from one look to the next
+    ours.reset(seed=7)
+    assert ours.np_random[1].random() != drawn[1]
+
+
+def test_a_batch_that_was_never_seeded_tells_the_seeds_that_it_uses():
+    env = batch(3, AutoresetMode.NEXT_STEP)
+    seeds = env.np_random_seed
+    assert len(set(seeds)) == 3
+    first, _ = env.reset()
+    assert env.np_random_seed == seeds
+    again, _ = batch(3, AutoresetMode.NEXT_STEP).reset(seed=list(seeds))
+    assert_array_equal(first, again)
+
+
 def test_a_broken_robot_leaves_its_neighbours_alone_and_starts_anew():
     broken, sound = batch(3, AutoresetMode.SAME_STEP), batch(3, AutoresetMode.SAME_STEP)
     broken.reset(seed=SEED)
@@ -248,6 +311,12 @@ def _started():
     env = batch(3, AutoresetMode.NEXT_STEP)
     env.reset(seed=0)
     return env
+
+
+def _masks(infos):
+    """Every mask, of inner dictionaries too."""
+    masks = [value for key, value in infos.items() if key.startswith("_")]
+    return masks + [mask for value in infos.values() if isinstance(value, dict) for mask in _masks(value)]
 
 
 def _spoil(value):

@@ -1,6 +1,8 @@
 """caster_gym.render.viewer: frames for Gymnasium, with and without a display."""
 
+import copy
 import os
+import pickle
 import subprocess
 import sys
 
@@ -274,3 +276,34 @@ def test_events_that_nobody_reads_do_not_pile_up(dummy_display):
     viewer.show([scene()])
     assert not pygame.event.peek(pygame.USEREVENT)
     viewer.close()
+
+
+def test_fonts_and_windows_that_somebody_has_quit_are_made_anew(dummy_display):
+    """Whether pygame was quit as a whole or in part, and whether others have started it again since."""
+    viewer = Viewer("human", SMALL, fps=1000.0)
+    still = Viewer("rgb_array", SMALL)
+    before = still.show([scene(time=1.0)])
+    endings = [pygame.quit, pygame.font.quit, pygame.display.quit, lambda: (pygame.quit(), pygame.init())]
+    for step, end in enumerate(endings):
+        viewer.show([scene(time=step)])
+        end()
+        viewer.show([scene(time=step + 0.123)])  # a time that no text has been drawn of before
+        assert pygame.display.get_surface() is not None
+        assert not viewer.closed
+        assert_array_equal(still.show([scene(time=1.0)]), before)
+    viewer.close()
+    viewer.close()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))], ids=["copy", "pickle"])
+def test_a_copy_draws_what_the_original_draws(copied):
+    """The trace of the robot included; afterwards each its own."""
+    original = Viewer("rgb_array", SMALL)
+    for step in range(5):
+        original.show([scene(0.1 * step, 0.0, time=step), scene(0.0, 0.1 * step, time=step)])
+    other = copied(original)
+    last = [scene(0.6, 0.2, time=6.0), scene(0.1, 0.5, time=6.0)]
+    frame = original.show(last)
+    assert_array_equal(other.show(last), frame)
+    other.show([scene(3.0, 0.0, time=7.0), scene(0.0, 0.0, time=7.0)])
+    assert_array_equal(original.show(last), frame)

@@ -1,22 +1,31 @@
 """One robot on a path as a Gymnasium environment, whatever its task."""
 
-from typing import Any
+import copy
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from caster_gym.envs.drawing import Easel, checked_mode
+from caster_gym.envs.drawing import Renderer, checked_mode
+from caster_gym.envs.infos import named
+from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
 from caster_gym.envs.setup import action_space, observation_space
+from caster_gym.envs.specification import plain_specification
+from caster_gym.envs.starts import read_options, read_start, restart_at
 from caster_gym.envs.task import Task
 from caster_gym.envs.task_engine import DRAW_A_PATH, TaskEngine
 
 Observation = NDArray[np.float32]
-_ONLY = np.zeros(1, dtype=np.int64)
+_ONLY, _CHOSEN = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.bool_)
 
 
 class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
-    """What the environments of single robots share; a subclass makes the engine of its task."""
+    """What the environments of single robots share; a subclass makes the engine of its task.
+
+    Copies, by `copy`, `pickle` or `cloudpickle`, go on as the original does, to the last bit, and independently of it.
+    """
 
     # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
@@ -26,44 +35,62 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.path_descriptions = engine.plan.descriptions  # what was made of each path of the pool
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
-        self._action_shape = self.action_space.shape
+        self._action_shape, self._terms = self.action_space.shape, engine.plan.terms
         self.render_mode = checked_mode(render_mode, self.metadata)
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
-        self._easel = Easel(engine, self.render_mode, self.metadata["render_fps"])
+        self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
         self._started = False
+        self._spec: EnvSpec | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode; info as after a step. options["path"] chooses a path by its index in the pool."""
-        path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
+        """Start an episode; info as after a step. The class says which options there are."""
+        given = read_options(options, self.engine)
+        path = self.engine.checked_path(given.get("path", DRAW_A_PATH))
+        wanted = read_start(given, self.engine, _CHOSEN)
+        seed = checked_seed(seed)
         super().reset(seed=seed)
         if seed is not None or not self._started:
             self.engine.seed(0, int(self.np_random.integers(2**63)))
             self._started = True
-        outcome = self.engine.restart(_ONLY, path=path)
+        outcome = restart_at(self.engine, _ONLY, wanted, path)
         if self.render_mode == "human":
             self.render()
         return outcome.observations[0], self.engine.info(outcome.reports[:, 0])
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
-        given = np.ascontiguousarray(action, dtype=np.float32)
-        if given.shape != self._action_shape:
-            raise ValueError(f"action must have shape {self._action_shape}, got {np.shape(action)}")
+        if not (type(action) is np.ndarray and action.dtype is FLOAT32 and action.flags.carray):
+            action = read_actions(action, self._action_shape, "action")
+        elif action.shape != self._action_shape:
+            raise ValueError(f"action must have shape {self._action_shape}, got {action.shape}")
         if not self._started:
             raise RuntimeError("reset the environment before its first step")
-        observation, reward, terminated, truncated, report = self.engine.step_alone(given)
+        observation, reward, terminated, truncated, report = self.engine.step_alone(action)
         if self.render_mode == "human":
             self.render()
-        return observation, reward, terminated, truncated, self.engine.info(report)
+        return observation, reward, terminated, truncated, named(report, self._terms)
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: two environments around one engine would move the same robot."""
+        return copy.deepcopy(self)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How the environment was made, in plain values, so that `spec.to_json()` works."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = plain_specification(spec)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The present moment as an image (height, width, 3), or in a window, as `render_mode` says."""
         if not self._started:
             raise RuntimeError("reset the environment before it is drawn")
-        return self._easel.show([0])
+        return self._renderer.show()
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._easel.close()
+        self._renderer.close()

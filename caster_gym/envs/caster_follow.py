@@ -5,7 +5,8 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from caster_gym.envs.caster_env import CasterEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv, check_counts
+from caster_gym.envs.caster_vector_env import CasterVectorEnv
+from caster_gym.envs.inputs import check_counts
 from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine
 
 
@@ -42,7 +43,9 @@ class CasterFollowEnv(CasterEnv):
     touched an obstacle and `touching` is "ends"; all terms of that step are 0. `truncated`: 1.5 times what the time
     law takes is over. Arriving does not end an episode.
 
-    **Start** at rest, with random steering, beside the path's start by up to 0.02 m along each axis and 0.1 rad.
+    **Start** at rest, with random steering, beside the path's start by up to 0.02 m along each axis and 0.1 rad, unless
+    `reset(options={…})` says otherwise: as for `CasterTrackEnv`, but with `progress` [m], the arc length s at which the
+    robot starts, instead of `time`. A `pose` without it starts at the place of the path that is nearest.
 
     robot, path, actuation, arena, render_mode: as for `CasterTrackEnv`; of a path only its geometry and headings count.
     All other keywords are fields of `caster_gym.envs.follow_task.FollowTask`, which holds the numbers above.

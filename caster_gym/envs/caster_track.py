@@ -5,7 +5,8 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from caster_gym.envs.caster_env import CasterEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv, check_counts
+from caster_gym.envs.caster_vector_env import CasterVectorEnv
+from caster_gym.envs.inputs import check_counts
 from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, track_engine
 
 
@@ -67,7 +68,16 @@ class CasterTrackEnv(CasterEnv):
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:
     the trajectory is over. Success does not end an episode.
 
-    **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad.
+    **Start** at rest, with random steering, beside the trajectory's start by up to 0.05 m along each axis and 0.2 rad,
+    unless `reset(options={…})` says otherwise; what it leaves open, and all later episodes, are drawn as without it:
+
+    | option | meaning | unit |
+    |---|---|---|
+    | path | index of the path in the pool | – |
+    | time | place along the trajectory, to the nearest control period; the start is drawn beside it | s |
+    | pose | x, y and heading in W; inside the corridor around the reference and free of obstacles | m, m, rad |
+    | twist | vx, vy, ω in B, which wheels and motors can reach | m/s, m/s, rad/s |
+    | steering | angle δ_i of each caster | rad |
 
     robot: name, YAML file, mapping or Robot. path: what `caster_gym.paths.read_paths` reads: a name, a file, points,
     poses with times, a Trajectory, a specification, or several of these, of which each episode draws one. actuation:

@@ -1,35 +1,44 @@
 """Many robots at once as a Gymnasium VectorEnv, whatever their task: one compiled call a step."""
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Iterator
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from caster_gym.envs.drawing import Easel, checked_mode
+from caster_gym.envs.drawing import Renderer, checked_mode
+from caster_gym.envs.inputs import Seeds, checked_mask, checked_seeds, read_actions
 from caster_gym.envs.setup import action_space, observation_space
+from caster_gym.envs.specification import plain_specification
+from caster_gym.envs.starts import read_options, read_start, restart_at
 from caster_gym.envs.task import Task
 from caster_gym.envs.task_engine import DRAW_A_PATH, Outcome, TaskEngine
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
-DRAWN = 16  # robots of a batch at most
 
 
 class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """What the batches of all tasks share; a subclass makes the engine of its task.
 
     Sub-environment i is seeded with seed + i. All of Gymnasium's autoreset modes are supported; with
-    AutoresetMode.DISABLED, `reset(options={"reset_mask": mask})` restarts some.
+    AutoresetMode.DISABLED, `reset(options={"reset_mask": mask})` restarts some. All other options are those of the
+    single environment, with one entry for all robots or one for each, robots in front.
+
+    render_mode: "rgb_array" gives a tuple with the frame of each robot, as its single environment would draw it, "grid"
+    one image of the first 16 side by side, "human" shows that in a window. Arrays that `reset` and `step` return are
+    never read again: they may be written into.
     """
 
     # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": ["human", "rgb_array", "grid"],
         "render_fps": 50,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -48,38 +57,43 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             "autoreset_mode": self.autoreset_mode,
             "render_fps": round(1.0 / task.control_period),
         }
-        self._easel = Easel(engine, self.render_mode, self.metadata["render_fps"])
+        self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
         self.single_observation_space = observation_space(engine)
         self.single_action_space = action_space(engine)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._actions_shape = self.action_space.shape
+        self._everyone = np.ones(self.num_envs, dtype=np.bool_)
+        self._seeds: list[int | None] = [None] * self.num_envs
+        self._generators: dict[int, np.random.Generator] = {}  # of robots whose generator somebody has asked for
         self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
         self._started = False
         self._done: Flags = np.zeros(self.num_envs, dtype=np.bool_)
-        self._observations: Observations = np.zeros((self.num_envs, engine.layout.size), dtype=np.float32)
+        self._spec: EnvSpec | None = None
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seeds = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Start episodes of all robots, or of those in options["reset_mask"].
-
-        options["path"] chooses trajectories by their index in the pool: one for all, or an array (num_envs,).
-        """
-        mask = self._mask(options)
-        path = self.engine.checked_path((options or {}).get("path", DRAW_A_PATH))
+        """Start episodes of all robots, or of those in options["reset_mask"], as the other options say."""
+        given = read_options(options, self.engine, "reset_mask")
+        mask = checked_mask(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._everyone
+        path = self.engine.checked_path(given.get("path", DRAW_A_PATH))
+        wanted = read_start(given, self.engine, mask)
+        seeds = checked_seeds(seed, self.num_envs)
         selected = np.flatnonzero(mask)
-        for robot, chosen in zip(selected.tolist(), np.array(self._seeds(seed), dtype=object)[mask], strict=True):
-            if chosen is not None or not self._seeded[robot]:
-                generator, _ = seeding.np_random(chosen)
-                self._seeded[robot] = True
-                self.engine.seed(robot, int(generator.integers(2**63)))
+        for robot in selected.tolist():
+            if seeds[robot] is not None or not self._seeded[robot]:
+                self.engine.seed(robot, self._fresh_key(robot, seeds[robot]))
+        outcome = restart_at(self.engine, selected, wanted, path[mask])
+        others = self._seeded & ~mask
+        if others.any():
+            outcome.observations[others] = self.engine.look().observations[others]
+        self._seeded |= mask
         self._started = bool(self._seeded.all())
         self._done = self._done & ~mask
-        outcome = self.engine.restart(selected, path=path[mask])
-        self._observations = np.where(mask[:, None], outcome.observations, self._observations)
         if self.render_mode == "human":
             self.render()
-        return self._observations, _masked(self.engine.info(outcome.reports), mask)
+        return outcome.observations, self._masked(self.engine.info(outcome.reports), mask)
 
     def step(
         self, actions: NDArray[np.float32]
@@ -88,42 +102,85 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
 
         Raises ValueError for a wrong shape or a value that is not a number.
         """
-        given = np.asarray(actions, dtype=np.float32)
-        if given.shape != self.action_space.shape:
-            raise ValueError(f"actions must have shape {self.action_space.shape}, got {given.shape}")
+        given = read_actions(actions, self._actions_shape)
         if np.isnan(given).any():
             raise ValueError(f"actions must hold numbers, got {given[np.isnan(given).any(axis=1)][0]}")
         if not self._started:
             raise RuntimeError("reset every robot before its first step")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise RuntimeError(f"robot {int(self._done.argmax())} has ended its episode: reset it before the next step")
-        outcome = self.engine.step(np.ascontiguousarray(given))
-        infos: dict[str, Any] = {}
-        everyone = np.ones(self.num_envs, dtype=np.bool_)
+        outcome = self.engine.step(given)
+        finals: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any():
             outcome = self._restart_ended(outcome)
         self._done = outcome.terminated | outcome.truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
-            infos = self._finals(outcome, self._done)
+            finals = self._finals(outcome, self._done)
             outcome = self.engine.restart(np.flatnonzero(self._done), outcome)
-        infos |= _masked(self.engine.info(outcome.reports), everyone)
-        self._observations = outcome.observations
+        infos = finals | self._masked(self.engine.info(outcome.reports), self._everyone)
         if self.render_mode == "human":
             self.render()
         return outcome.observations, outcome.rewards, outcome.terminated, outcome.truncated, infos
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]  # Gymnasium's type has tuples of frames
-        """The first 16 robots in a grid: one image (height, width, 3), or a window, as `render_mode` says.
+    def render(self) -> tuple[NDArray[np.uint8], ...] | NDArray[np.uint8] | None:  # type: ignore[override]
+        """Frames (height, width, 3) of the robots, one of a grid of the first 16, or a window, as `render_mode` says.
 
-        Gymnasium's RecordVideo for batches asks for a frame of each robot, and so cannot film this.
+        Gymnasium's type knows no grid.
         """
         if not self._started:
             raise RuntimeError("reset every robot before they are drawn")
-        return self._easel.show(range(min(self.num_envs, DRAWN)))
+        return self._renderer.show_batch()
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: two batches around one engine would move the same robots."""
+        return copy.deepcopy(self)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How the batch was made, in plain values, so that `spec.to_json()` works."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = plain_specification(spec)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]  # as Gymnasium's SyncVectorEnv
+        """The seed of each robot; of one that was not seeded, that of a random generator."""
+        return tuple(self._seed_of(robot) for robot in range(self.num_envs))
+
+    @property  # type: ignore[misc]  # they are not to be set
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]  # as SyncVectorEnv
+        """The generator of each robot, as its single environment has it. Keys of episodes are drawn from it."""
+        return tuple(self._generator(robot) for robot in range(self.num_envs))
+
+    def _seed_of(self, robot: int) -> int:
+        seed = self._seeds[robot]
+        if seed is None:
+            self._generators[robot], seed = seeding.np_random()
+            self._seeds[robot] = seed
+        return seed
+
+    def _generator(self, robot: int) -> np.random.Generator:
+        """A robot's generator. Most are never asked for, so that they are made, and wound on, when they are."""
+        seed = self._seed_of(robot)
+        if robot not in self._generators:
+            self._generators[robot] = seeding.np_random(seed)[0]
+            if self._seeded[robot]:
+                _draw_key(self._generators[robot])
+        return self._generators[robot]
+
+    def _fresh_key(self, robot: int, seed: int | None) -> int:
+        """What all random numbers of a robot count from, by a new seed or, at its first reset, without one."""
+        if seed is None and robot in self._generators:
+            return _draw_key(self._generators[robot])
+        self._generators.pop(robot, None)
+        generator, self._seeds[robot] = seeding.np_random(seed)
+        return _draw_key(generator)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
-        self._easel.close()
+        self._renderer.close()
 
     def _restart_ended(self, outcome: Outcome) -> Outcome:
         """The step of robots whose episode ended one step ago becomes their reset."""
@@ -138,52 +195,28 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         observations = np.full(self.num_envs, None, dtype=object)
         for robot in np.flatnonzero(ended):
             observations[robot] = outcome.observations[robot].copy()
-        final = _masked(self.engine.info(np.where(ended, outcome.reports, 0.0)), ended)
+        final = self._masked(self.engine.info(np.where(ended, outcome.reports, 0.0)), ended)
         return {"final_obs": observations, "_final_obs": ended.copy(), "final_info": final, "_final_info": ended.copy()}
 
-    def _mask(self, options: dict[str, Any] | None) -> Flags:
-        if options is None or "reset_mask" not in options:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        mask = options["reset_mask"]
-        if (
-            not isinstance(mask, np.ndarray)
-            or mask.dtype != np.bool_
-            or mask.shape != (self.num_envs,)
-            or not mask.any()
-        ):
-            raise ValueError(
-                f"options['reset_mask'] must be a boolean array of shape ({self.num_envs},) with at least one True, "
-                f"got {mask!r}"
-            )
-        return mask.copy()
+    def _masked(self, infos: dict[str, Any], mask: Flags) -> dict[str, Any]:
+        """Infos with a mask `_key` beside each key, an array of its own, as Gymnasium's vector environments have it.
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seed)}")
-        return list(seed)
+        They are the rows of one array, since an allocation for each would take longer than the infos.
+        """
+        terms = infos["reward_terms"]
+        names, inner = _mask_names(tuple(infos)), _mask_names(tuple(terms))
+        count = len(names) + len(inner)
+        table = np.ones((count, self.num_envs), np.bool_) if mask is self._everyone else np.tile(mask, (count, 1))
+        masks: Iterator[Flags] = iter(table)
+        terms.update(zip(inner, masks, strict=False))
+        infos.update(zip(names, masks, strict=True))
+        return infos
 
 
-def _masked(infos: dict[str, Any], mask: Flags) -> dict[str, Any]:
-    """Infos with a mask `_key` beside each key, the same for all, as Gymnasium's vector environments give them."""
-    result = infos | dict.fromkeys(_mask_names(tuple(infos)), mask)
-    for key, value in infos.items():
-        if isinstance(value, dict):
-            result[key] = _masked(value, mask)
-    return result
+def _draw_key(generator: np.random.Generator) -> int:
+    return int(generator.integers(2**63))
 
 
 @cache
 def _mask_names(keys: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"_{key}" for key in keys)
-
-
-def check_counts(num_envs: int, max_episode_steps: int | None) -> None:
-    """Refuse batches without robots and episodes without steps."""
-    if num_envs < 1:
-        raise ValueError(f"num_envs must be 1 or more, got {num_envs}")
-    if max_episode_steps is not None and max_episode_steps < 1:
-        raise ValueError(f"max_episode_steps must be 1 or more, got {max_episode_steps}")

@@ -1,7 +1,6 @@
 """Lets environments draw themselves, as Gymnasium asks; what is drawn, and how, is said in `caster_gym.render`."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from gymnasium import logger
@@ -10,7 +9,10 @@ from numpy.typing import NDArray
 from caster_gym.envs.task_engine import TaskEngine
 
 if TYPE_CHECKING:
+    from caster_gym.render.album import Album
     from caster_gym.render.viewer import Viewer
+
+Frame: TypeAlias = NDArray[np.uint8]
 
 
 def checked_mode(render_mode: str | None, metadata: dict[str, Any]) -> str | None:
@@ -20,30 +22,55 @@ def checked_mode(render_mode: str | None, metadata: dict[str, Any]) -> str | Non
     return render_mode
 
 
-class Easel:
+class Renderer:
     """Holds the viewer of an environment, which is made when something is drawn for the first time."""
 
     def __init__(self, engine: TaskEngine, render_mode: str | None, fps: int) -> None:
         self._engine, self._mode, self._fps = engine, render_mode, fps
         self._viewer: Viewer | None = None
+        self._album: Album | None = None
+        if render_mode is not None:
+            engine.keep_reports()
 
-    def show(self, robots: Sequence[int]) -> NDArray[np.uint8] | None:
-        """A frame (height, width, 3) of some robots, or None if they are shown in a window or not at all."""
-        if self._mode is None:
-            logger.warn(
-                'render() draws nothing without a render_mode; make the environment with render_mode="rgb_array" '
-                'or "human"'
-            )
+    def show(self) -> Frame | None:
+        """A frame (height, width, 3) of the only robot, or None if it is shown in a window or not at all."""
+        return None if self._warned() else self._open_viewer().show([self._engine.scene(0)])
+
+    def show_batch(self) -> tuple[Frame, ...] | Frame | None:
+        """A frame of each robot, one of a grid of the first, or None if they are shown in a window or not at all."""
+        if self._warned():
             return None
-        if self._viewer is None:
-            # Gymnasium's environments draw themselves, so that this one import points up; it waits until it is needed
-            from caster_gym.render.viewer import Viewer
-
-            self._viewer = Viewer(self._mode, fps=self._fps)
-        return self._viewer.show([self._engine.scene(robot) for robot in robots])
+        if self._mode == "rgb_array":
+            return self._open_album().show([self._engine.scene(robot) for robot in range(self._engine.count)])
+        viewer = self._open_viewer()
+        return viewer.show([self._engine.scene(robot) for robot in range(min(self._engine.count, viewer.most))])
 
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._viewer is not None:
             self._viewer.close()
-            self._viewer = None
+        self._viewer = self._album = None
+
+    def _warned(self) -> bool:
+        if self._mode is None:
+            logger.warn(
+                'render() draws nothing without a render_mode; make the environment with render_mode="rgb_array" '
+                'or "human"'
+            )
+        return self._mode is None
+
+    # Gymnasium's environments draw themselves, so that these two import from above; they wait until it is needed
+
+    def _open_viewer(self) -> "Viewer":
+        from caster_gym.render.viewer import Viewer
+
+        if self._viewer is None:
+            self._viewer = Viewer("human" if self._mode == "human" else "rgb_array", fps=self._fps)
+        return self._viewer
+
+    def _open_album(self) -> "Album":
+        from caster_gym.render.album import Album
+
+        if self._album is None:
+            self._album = Album()
+        return self._album

@@ -19,9 +19,11 @@ from caster_gym.envs import follow_task, track_task
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.following import FollowTerms
 from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.inputs import check_keywords
 from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.plan import Pace, Plan, joined
 from caster_gym.envs.task import Task
-from caster_gym.envs.task_engine import Pace, Plan, TaskEngine, joined
+from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.mechanics.separation import Surroundings
@@ -33,6 +35,14 @@ from caster_gym.robot import Robot, load_robot
 RobotLike: TypeAlias = str | Path | Robot | Mapping[str, Any]
 ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
 Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
+
+KEYWORDS = (
+    "robot",
+    "path",
+    "actuation",
+    "arena",
+    "render_mode",
+)  # of the environments, beside the fields of their task
 
 
 def track_engine(
@@ -48,6 +58,7 @@ def track_engine(
 
     longest: greatest number of control periods of an episode.
     """
+    check_keywords(fields, (*KEYWORDS, *TrackTask.model_fields), "CasterTrack")
     chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
@@ -66,6 +77,7 @@ def follow_engine(
     longest: int | None = None,
 ) -> tuple[TaskEngine, FollowTask]:
     """The same for the following task."""
+    check_keywords(fields, (*KEYWORDS, *FollowTask.model_fields), "CasterFollow")
     chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)

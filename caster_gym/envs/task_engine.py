@@ -1,7 +1,8 @@
 """Every task for any number of robots, moved by compiled code; the environments are thin faces of this."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+import copy
+from collections.abc import Callable
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,39 +16,17 @@ from caster_gym.engines.threads import over_blocks
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs import task_kernel as kernel
-from caster_gym.envs.block_layout import (
-    CONDITIONING,
-    ENDINGS,
-    FIRST_POSE,
-    FIRST_RECORD,
-    FIRST_SITUATION,
-    FIRST_TERM,
-    FIXED_REPORT_ROWS,
-    HEADING_SIN,
-    LEFT_CORRIDOR,
-    NOT_FINITE,
-    POSITION_ERROR,
-    TOUCHED,
-    TRACTION_USE,
-)
-from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.block_layout import FIXED_REPORT_ROWS
+from caster_gym.envs.guides import Courses
+from caster_gym.envs.infos import named
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.scene import Scene
-from caster_gym.mechanics import ground
-from caster_gym.mechanics.dynamics import forward_dynamics
-from caster_gym.mechanics.integration import unpack_state
-from caster_gym.mechanics.motors import joint_torques
+from caster_gym.envs.plan import Pace, Plan
+from caster_gym.envs.scene import Scene, draw_scene
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
-from caster_gym.mechanics.scalars import each, pairs
-from caster_gym.mechanics.separation import Surroundings
+from caster_gym.mechanics.separation import Obstacles
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
-
-_TERMS = slice(FIRST_TERM, FIRST_POSE)
-_TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
-_POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIRST_POSE + 4 : FIRST_POSE + 8]
-_IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
 
 
 class Outcome(NamedTuple):
@@ -58,28 +37,6 @@ class Outcome(NamedTuple):
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
     reports: NDArray[np.float64]  # (quantities, robots)
-
-
-class Plan(NamedTuple):
-    """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
-
-    guide: Timetable | Courses
-    names: tuple[str, ...]  # of the paths
-    tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
-    terms: tuple[str, ...]  # names of the reward's terms
-    around: Surroundings
-    arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
-    descriptions: tuple[str, ...]  # what was made of each path
-
-
-class Pace(NamedTuple):
-    """What the engine needs to know of a task."""
-
-    substeps: int
-    time_step: float  # [s]
-    corridor: float  # [m]
-    start_offset: float  # [m]
-    start_turn: float  # [rad]
 
 
 class TaskEngine:
@@ -97,38 +54,80 @@ class TaskEngine:
             tuple(range(robot.caster_count)), tuple(range(len(observed.preview))), tuple(range(observed.nearest))
         )
         check_memory(count, layout.desk_rows(self._sizes))
-        self._spread = np.array([pace.start_offset, pace.start_turn])
-        self._observation_size = observed.size
+        self.spread = np.array([pace.start_offset, pace.start_turn])  # [m], [rad] greatest displacements of a start
+        self.corridor, self.control_period = pace.corridor, pace.substeps * pace.time_step  # [m], [s]
         self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count
-        self._desk = np.zeros(layout.desk_rows(self._sizes) * LANES)
+        self._told: NDArray[np.float64] | None = None  # latest reports of a batch that is drawn, copied for pictures
+        self._late: NDArray[np.int64] | None = None  # (robots,) clocks at which episodes began, unless all were 0
         kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
-        if count == 1:
-            blocks, parameters = self._desk.reshape(1, -1), self._desk[kept * LANES : end * LANES].reshape(1, -1)
-        else:
-            blocks, parameters = np.zeros((block_count(count), kept * LANES)), np.zeros((1, (end - kept) * LANES))
-        to_lanes(np.array([pack_parameters(robot_parameters(robot))]), parameters, 0)
-        self._reports: NDArray[np.float64] = np.zeros((self._report_rows, count))  # the latest, for pictures
-        self._shelves = (
-            Shelf((count, observed.size), np.float32),
-            Shelf((self._report_rows, count), np.float64),
-            Shelf((3, count), np.float64),
+        self._build(
+            np.zeros((1, layout.desk_rows(self._sizes) * LANES) if count == 1 else (block_count(count), kept * LANES)),
+            np.zeros((1, (end - kept) * LANES)),
+            np.zeros((2, count), dtype=np.int64),
+            np.zeros((2, count), dtype=np.uint64),
         )
+        to_lanes(np.array([pack_parameters(robot_parameters(robot))]), self._world.parameters, 0)
+
+    def _build(
+        self,
+        blocks: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        clocks: NDArray[np.int64],
+        seeds: NDArray[np.uint64],
+    ) -> None:
+        """Put what changes from step to step together with what stays. A robot alone lives on its desk, `blocks`."""
+        plan, robot, count = self.plan, self.robot, self.count
         among = len(plan.around.obstacles.radii) > 0
+        self._desk = blocks.reshape(-1) if count == 1 else np.zeros(layout.desk_rows(self._sizes) * LANES)
         self._world = layout.World(
             blocks=blocks,
-            parameters=parameters,
-            clocks=np.zeros((2, count), dtype=np.int64),
-            seeds=np.zeros((2, count), dtype=np.uint64),
+            parameters=self._desk_parameters(self._desk) if count == 1 else parameters,
+            clocks=clocks,
+            seeds=seeds,
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
             guide=plan.guide,
             hull=plan.around.hull if among else None,
             obstacles=plan.around.obstacles if among else None,
             arenas=plan.arenas if among else None,
-            substeps=pace.substeps,
-            time_step=pace.time_step,
+            substeps=self._pace.substeps,
+            time_step=self._pace.time_step,
         )
+        self._shelves = (
+            Shelf((count, self.layout.size), np.float32),
+            Shelf((self._report_rows, count), np.float64),
+            Shelf((3, count), np.float64),
+        )
+        self._observation_size = self.layout.size
         self._results = np.zeros(3)  # of a robot alone
         self._held: Held | None = None  # made when it is needed, since that may have to compile
+
+    def _desk_parameters(self, desk: NDArray[np.float64]) -> NDArray[np.float64]:
+        kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
+        return desk[kept * LANES : end * LANES].reshape(1, -1)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy needs. All that compiled code refers to is put together anew around its arrays."""
+        rebuilt = ("_desk", "_world", "_shelves", "_observation_size", "_results", "_held")
+        state = {name: value for name, value in vars(self).items() if name not in rebuilt}
+        return state | {"changing": self.changing}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        changing = state.pop("changing")
+        vars(self).update(state)
+        self._build(*changing)
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: two engines that share arrays would move the same robots."""
+        return copy.deepcopy(self)
+
+    @property
+    def changing(self) -> tuple[NDArray[Any], ...]:
+        """Copies of all that changes from step to step: blocks, parameters, clocks, seeds."""
+        return tuple(np.array(part) for part in self._world[:4])
+
+    @changing.setter
+    def changing(self, parts: tuple[NDArray[Any], ...]) -> None:
+        self._build(*(np.array(part) for part in parts))
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
@@ -151,12 +150,14 @@ class TaskEngine:
         views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         before = compilations()
-        kernel.restart(selected, paths, self._world, self._spread, views, self._desk, self._sizes)
+        kernel.restart(selected, paths, self._world, self.spread, views, self._desk, self._sizes)
         if compilations() > before:
             self._compile_step()
-        if into is None:
-            self._reports = self._reports.reshape(self._report_rows, -1).copy()
-            self._reports[:, selected] = outcome.reports[:, selected]
+        if self._told is not None:
+            self._told[:, selected] = outcome.reports[:, selected]
+        if self._late is not None:
+            self._late[selected] = 0
+            self._late = self._late if self._late.any() else None
         return outcome
 
     def checked_path(self, path: Any) -> NDArray[np.int64]:
@@ -178,8 +179,12 @@ class TaskEngine:
         observations, reports, results = (shelf.take() for shelf in self._shelves)
         views = layout.Views(observations, reports, results)
         over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
-        self._reports = reports
-        return Outcome(observations, results[0], results[1] > 0.0, results[2] > 0.0, reports)
+        if self._told is not None:
+            self._told = reports.copy()
+        if self.count == 1:
+            self._desk_report[:] = reports[:, 0]
+        truncated = results[2] > 0.0 if self._late is None else self._over(self._late)
+        return Outcome(observations, results[0], results[1] > 0.0, truncated, reports)
 
     def step_alone(
         self, action: NDArray[np.float32]
@@ -194,7 +199,6 @@ class TaskEngine:
         held = self._held if self._held is not None else self._hold()
         if not kernel.step_single(held, action, observation, report):
             raise ValueError(f"action must hold numbers, got {action}")
-        self._reports = report
         reward, failed, late = self._results.tolist()
         return observation, reward, failed > 0.0, late > 0.0, report
 
@@ -212,6 +216,58 @@ class TaskEngine:
                 views = layout.Views(nothing.observations, nothing.reports, np.zeros((3, self.count)))
                 actions = np.zeros((self.count, len(action)), dtype=np.float32)
                 kernel.step_blocks(0, 0, self._world, actions, views, self._sizes)
+
+    def look(self, progress_stays: bool = True) -> Outcome:
+        """What all robots see and report where they are now, as at a start: after no time, without torques.
+
+        Everything comes from what the engine alone holds; arrays that it gave away may have been written into since.
+        Unless their progress stays, the robots seek the point of a path that is nearest to them.
+        """
+        world = self._world
+        blocks, parameters, clocks, _ = self.changing
+        guide: Any = world.guide
+        if progress_stays and isinstance(guide, Courses):
+            guide = guide._replace(window=0.0)
+        clocks[0] -= 1
+        still = world._replace(blocks=blocks, parameters=parameters, clocks=clocks, guide=guide, substeps=0)
+        outcome = self._empty()
+        still_actions = np.zeros((self.count, len(self.robot.driven)), dtype=np.float32)
+        if self.count > 1:
+            views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, self.count)))
+            kernel.step_blocks(0, len(blocks), still, still_actions, views, self._sizes)
+            return outcome
+        desk = blocks.reshape(-1)
+        held = Held((still._replace(parameters=self._desk_parameters(desk)), desk, np.zeros(3), self._sizes))
+        report = np.zeros(self._report_rows)
+        kernel.step_single(held, still_actions[0], outcome.observations[0], report)
+        outcome.reports[:, 0] = report
+        return outcome
+
+    def put(
+        self,
+        selected: NDArray[np.int64],
+        states: NDArray[np.float64] | None = None,
+        clocks: NDArray[np.int64] | None = None,
+        progress: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Give some robots other states (selected, 7 + 2 N), clocks [control periods] and progress [m] (selected,)."""
+        rows = self._world.blocks.reshape(len(self._world.blocks), -1, LANES)
+        block, lane = selected // LANES, selected % LANES
+        if states is not None:
+            rows[block, : layout.room_row(self._sizes), lane] = states
+            rows[block, layout.room_row(self._sizes), lane] = 0.0
+        if progress is not None:
+            rows[block, layout.progress_row(self._sizes), lane] = progress
+        if clocks is not None:
+            self._world.clocks[0, selected] = clocks
+            self._late = np.zeros(self.count, dtype=np.int64) if self._late is None else self._late
+            self._late[selected] = clocks
+
+    def _over(self, late: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whose time is over; an episode that began late may take as long as any, but not past the trajectory's end."""
+        first, last, longest = self.plan.guide.spans[self._world.clocks[1]].T
+        over: NDArray[np.bool_] = self._world.clocks[0] >= np.minimum(last - first, late + longest)
+        return over
 
     def _empty(self) -> Outcome:
         size, count = self.layout.size, self.count
@@ -282,70 +338,41 @@ class TaskEngine:
         return np.array(self._world.clocks[1])
 
     def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
-        """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
-
-        Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
-        """
-        row: Any = reports if reports.ndim > 1 else reports.tolist()  # numbers of one robot are Python's own
-        columns = reports.T
-        return {
-            "position_error": row[POSITION_ERROR],
-            "heading_error": row[HEADING_SIN],
-            "reward_terms": dict(zip(self.plan.terms, row[_TERMS], strict=False)),
-            "torque": columns[_TORQUES],
-            "power": row[FIRST_RECORD],
-            "traction_use": row[TRACTION_USE],
-            "conditioning": row[CONDITIONING],
-            "pose": columns[_POSE],
-            "reference_pose": columns[_REFERENCE_POSE],
-            "progress": row[FIRST_SITUATION],
-            "progress_share": row[FIRST_SITUATION + 1],
-            "clearance": row[FIRST_SITUATION + 2],
-            "impacts": row[FIRST_RECORD + 6],
-            "impulse": columns[_IMPULSE],
-            "normal_impulse": row[FIRST_RECORD + 3],
-            "left_corridor": row[LEFT_CORRIDOR] > 0.0,
-            "not_finite": row[NOT_FINITE] > 0.0,
-            "touched": row[TOUCHED] > 0.0,
-        }
+        """Named quantities of all robots, or one; see `caster_gym.envs.infos`."""
+        return named(reports, self.plan.terms)
 
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
-        state = self.states[robot]
-        report = self._reports.reshape(self._report_rows, -1)[:, robot]
+        if self.count > 1 and self._told is None:
+            self.keep_reports()
         path = int(self._world.clocks[1, robot])
-        near, end = self.plan.arenas[path]
-        record = report[FIRST_RECORD:]
-        return Scene(
-            robot=self.robot,
-            time=float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
-            pose=state[:4],
-            twist=state[4:7],
-            directions=state[7:].reshape(-1, 2),
-            torque=report[FIXED_REPORT_ROWS:].copy(),
-            ground_forces=self._ground_forces(state, report[FIXED_REPORT_ROWS:]),
-            path=self.plan.tables[path][:, :2],
-            corridor=self._pace.corridor,
-            reference=report[FIRST_POSE + 4 : FIRST_POSE + 8].copy(),
-            obstacles=self.plan.around.obstacles._replace(
-                radii=self.plan.around.obstacles.radii[near:end], spans=self.plan.around.obstacles.spans[near:end]
-            ),
-            impulse=record[1:3].copy(),
-            impact_point=record[4:6].copy() if record[6] > 0.0 else np.full(2, np.nan),
-            failed=bool(report[:ENDINGS].any()),
+        return draw_scene(
+            self.robot,
+            float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
+            self.states[robot],
+            self._report_of(robot),
+            self.plan.tables[path][:, :2],
+            self._pace.corridor,
+            self._obstacles_beside(path),
         )
 
-    def _ground_forces(self, state: NDArray[np.float64], torque: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Forces (N, 2) of the floor on each wheel along its rolling direction and to its left. [N]"""
-        parameters, now = robot_parameters(self.robot), unpack_state(tuple(state.tolist()))
-        at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
-        rate = forward_dynamics(now.twist, now.directions, at_joints, (0.0, 0.0, 0.0), parameters)
-        shared = now.twist, rate, parameters.platform.coulomb_speed
-        return np.array(each(ground.ground_force, shared, now.directions, parameters.casters, at_joints))
+    def keep_reports(self) -> None:
+        """Keep a copy of every report from now on, which pictures of a batch need."""
+        if self._told is None and self.count > 1:
+            self._told = self.look().reports
 
+    def _report_of(self, robot: int) -> NDArray[np.float64]:
+        """The latest report of a robot, from where nobody else can have changed it."""
+        if self._told is not None:
+            return self._told[:, robot].copy()
+        return self._desk_report.copy()
 
-def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """All tables of paths in one (rows, columns), with each one's first and last row (paths, 2)."""
-    lengths = np.array([len(table) for table in tables])
-    ends = np.cumsum(lengths)
-    return np.ascontiguousarray(np.concatenate(tables)), np.stack([ends - lengths, ends - 1], axis=1).astype(np.int64)
+    @property
+    def _desk_report(self) -> NDArray[np.float64]:
+        """Where the latest report of a robot alone stands."""
+        row = layout.report_row(self._sizes)
+        return self._desk.reshape(-1, LANES)[row : row + self._report_rows, 0]
+
+    def _obstacles_beside(self, path: int) -> Obstacles:
+        around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
+        return around._replace(radii=around.radii[near:end], spans=around.spans[near:end])

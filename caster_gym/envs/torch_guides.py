@@ -37,10 +37,15 @@ class TorchTimetable:
         self.weights = Weights(*_weights(guide.weights, dtype, device))
         self._horizons = tuple(guide.horizons.tolist())
 
+    def reference_at(self, path: Tensor, clock: Tensor, _state: State) -> Reference:
+        """Reference at clocks (robots,) [control periods]."""
+        first, last = self.spans[path, 0], self.spans[path, 1]
+        return Reference(*self.samples[:, torch.minimum(first + clock, last)].unbind(0))
+
     def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
         """Reference and preview at the robots' clocks."""
         first, last = self.spans[path, 0], self.spans[path, 1]
-        reference = Reference(*self.samples[:, torch.minimum(first + clock, last)].unbind(0))
+        reference = self.reference_at(path, clock, state)
         rows = [self.samples[:POINT_ROWS, torch.minimum(first + clock + ahead, last)] for ahead in self._horizons]
         none = torch.zeros_like(before)
         return Guidance(reference, tuple(cast(Point, row.unbind(0)) for row in rows), none, none)
@@ -62,12 +67,12 @@ class TorchCourses:
     def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
         """Reference and preview at the points of the paths nearest to the robots; before: their progress so far [m]."""
         guide, length = self._guide, self._lengths[path]
-        sought = self._nearest(state, path, maximum(before, 0.0))
+        sought = self.nearest(state, path, maximum(before, 0.0))
         progress = torch.where(before < 0.0, 0.0, sought)
-        reference = self._reference_at(path, progress, state)
+        reference = self.reference_at(path, progress, state)
         preview = []
         for ahead in self._horizons:
-            r = self._reference_at(path, torch.minimum(progress + ahead, length), state)
+            r = self.reference_at(path, torch.minimum(progress + ahead, length), state)
             preview.append((r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega))
         share = minimum((progress - maximum(before, 0.0)) / guide.stride, 1.0)
         last: Row = self._row(self.spans[path, 1])
@@ -78,7 +83,7 @@ class TorchCourses:
     def _row(self, i: Tensor) -> Row:
         return cast(Row, self.samples[:, i].unbind(0))
 
-    def _nearest(self, state: State, path: Tensor, before: Tensor) -> Tensor:
+    def nearest(self, state: State, path: Tensor, before: Tensor) -> Tensor:
         """Arc length of the point nearest to each robot, from `before` to a window ahead. [m]"""
         x, y = state.position
         base, last, spacing = self.spans[path, 0], self.spans[path, 1], self._spacings[path]
@@ -105,7 +110,7 @@ class TorchCourses:
         reached = torch.minimum((chosen - base + share) * spacing, before + self._guide.window)
         return torch.maximum(reached, before)
 
-    def _reference_at(self, path: Tensor, arc: Tensor, state: State) -> Reference:
+    def reference_at(self, path: Tensor, arc: Tensor, state: State) -> Reference:
         """Reference at an arc length [m]; at rest at the end of the path, and turned like the robot if that is free.
 
         A robot without a heading (0, 0) is one that has not started.

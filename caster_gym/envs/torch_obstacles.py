@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils import _pytree as pytree
 
-from caster_gym.envs.task_engine import Plan
+from caster_gym.envs.plan import Plan
 from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters

@@ -6,9 +6,12 @@ Nothing waits for the device, and nothing is written in place.
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Literal, NamedTuple, TypeAlias
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from caster_gym.engines.guarding import settled
@@ -17,10 +20,11 @@ from caster_gym.engines.torch_fleet import BODY_ROWS
 from caster_gym.engines.torch_motion import driven_rows
 from caster_gym.engines.torch_scalars import check_memory, checked_device, checked_dtype
 from caster_gym.envs import block_layout as layout
-from caster_gym.envs.guides import judge
+from caster_gym.envs.guides import Courses, judge
 from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine, track_engine
+from caster_gym.envs.starts import DRAWN, Start, check_free, check_longest, check_motion, check_place, nearest_row
 from caster_gym.envs.task_engine import DRAW_A_PATH
-from caster_gym.envs.torch_guides import torch_guide
+from caster_gym.envs.torch_guides import TorchGuide, torch_guide
 from caster_gym.envs.torch_obstacles import Given, torch_surroundings
 from caster_gym.envs.torch_randomness import episode_seed, uniform
 from caster_gym.envs.tracking import (
@@ -131,14 +135,30 @@ class TorchTask:
         self._slots = tuple(driven.index(joint) if joint in driven else -1 for joint in self.robot.joints)
         self._compiled = compile
         self.graphs = compile and graphs and self._around is None  # obstacles wait for the device
+        self._compile()
+
+    def _compile(self) -> None:
         self._move, self._look, self._place = self._moved, self._looked, self._placed
-        if compile:
+        if self._compiled:
             self._move = compiled(self._moved, self.device, self.graphs)
             self._look = compiled(self._looked, self.device, self.graphs)
             self._place = compiled(self._placed, self.device, self.graphs)
 
-    def begin(self, keys: Tensor, path: Tensor | int = DRAW_A_PATH) -> tuple[TaskState, TaskOutcome]:
-        """First episodes of robots with the given keys, int64 (robots,); path: index for each, or drawn."""
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy needs, which compiles its own functions."""
+        return {name: value for name, value in vars(self).items() if name not in ("_move", "_look", "_place")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._compile()
+
+    def begin(
+        self, keys: Tensor, path: Tensor | int = DRAW_A_PATH, start: Start = DRAWN
+    ) -> tuple[TaskState, TaskOutcome]:
+        """First episodes of robots with the given keys, int64 (robots,); path: index for each, or drawn.
+
+        start: where it is given, of all robots; see `caster_gym.envs.starts.read_start`.
+        """
         count = len(keys)
         rows = 3 * self.layout.size + 2 * (layout.FIXED_REPORT_ROWS + 4 * self.robot.caster_count)
         check_memory(count, rows, self.dtype, self.device)
@@ -150,11 +170,11 @@ class TorchTask:
             none[0],
             whole,
             whole,
-            torch.as_tensor(keys, device=self.device),
+            torch.as_tensor(keys, device=self.device).clone(),
             whole,
         )
         wanted = torch.as_tensor(path, device=self.device).expand(count)
-        return self._start(state, wanted)
+        return self._start(state, wanted, start, torch.ones_like(whole, dtype=torch.bool))
 
     def step(self, state: TaskState, actions: Tensor, wrench: Tensor | None = None) -> tuple[TaskState, TaskOutcome]:
         """Hold actions (robots, driven joints) for a control period; nobody is restarted.
@@ -183,14 +203,19 @@ class TorchTask:
         return state._replace(bodies=bodies, progress=progress, room=room, clocks=clocks), outcome
 
     def restart(
-        self, state: TaskState, outcome: TaskOutcome, where: Tensor | None = None, path: Tensor | int = DRAW_A_PATH
+        self,
+        state: TaskState,
+        outcome: TaskOutcome,
+        where: Tensor | None = None,
+        path: Tensor | int = DRAW_A_PATH,
+        start: Start = DRAWN,
     ) -> tuple[TaskState, TaskOutcome]:
         """New episodes where they have ended, or of the robots of a mask (robots,).
 
         Observations and reports become those of the starts; rewards and endings stay those of the step.
         """
         again = outcome.ended if where is None else where
-        fresh, first = self._start(state, torch.as_tensor(path, device=self.device).expand(len(again)))
+        fresh, first = self._start(state, torch.as_tensor(path, device=self.device).expand(len(again)), start, again)
         merged = TaskState(*(torch.where(again, new, old) for new, old in zip(fresh, state, strict=True)))
         return merged, outcome._replace(  # rows of robots, whose entries lie side by side, are the fastest to choose
             observations=torch.where(again, first.observations.T, outcome.observations.T).T,
@@ -212,6 +237,9 @@ class TorchTask:
 
     def _commands(self, actions: Tensor, count: int) -> Tensor:
         """A command in −1 … 1 for each motor (2 N, robots), 0 where it is not driven."""
+        if not isinstance(actions, Tensor) or actions.is_complex() or actions.dtype is torch.bool:
+            got = actions.dtype if isinstance(actions, Tensor) else type(actions).__name__
+            raise ValueError(f"actions must be a tensor of real numbers, got {got}")
         if actions.shape != (count, len(self.robot.driven)):
             raise ValueError(f"actions must have shape {(count, len(self.robot.driven))}, got {tuple(actions.shape)}")
         rows = actions.to(self.dtype).clamp(-1.0, 1.0).T
@@ -239,16 +267,27 @@ class TorchTask:
         return bodies, record, room
 
     def _looked(
-        self, bodies: Tensor, record: Tensor, clocks: Tensor, paths: Tensor, before: Tensor, robot: RobotParameters
+        self,
+        bodies: Tensor,
+        record: Tensor,
+        clocks: Tensor,
+        paths: Tensor,
+        before: Tensor,
+        robot: RobotParameters,
+        guide: TorchGuide | None = None,
     ) -> tuple[TaskOutcome, Tensor, Tensor]:
-        """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start."""
+        """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start.
+
+        guide: another one than the task's.
+        """
         state, n = unpack_state(bodies.unbind(0)), self._joints
         torques, done = pairs(record[:n].unbind(0)), Record(*record[n:].unbind(0))
-        guidance = self._guide.fetch(state, clocks, paths, before)
+        guide = self._guide if guide is None else guide
+        guidance = guide.fetch(state, clocks, paths, before)
         reference = guidance.reference
         gap, nearest = self._look_around(state, paths)
         situation = Situation(guidance.progress, guidance.share, gap)
-        errors, ended, terms = judge(state, reference, torques, done, situation, robot, self._guide.weights)
+        errors, ended, terms = judge(state, reference, torques, done, situation, robot, guide.weights)
         if self.diagnostics:
             whole = report(state, reference, errors, torques, done, situation, ended, terms, robot)
         else:
@@ -261,7 +300,7 @@ class TorchTask:
         seen = observe(state, reference, errors, guidance.preview, nearest, robot)
         (rewards,) = total(each(_alone, (), terms))
         (failed,) = total(each(_alone, (), ended))
-        truncated = clocks >= self._guide.spans[paths, 2]
+        truncated = clocks >= guide.spans[paths, 2]
         numbers = torch.stack([number.to(self.dtype) for number in told])
         return TaskOutcome(torch.stack(seen).T, rewards, failed > 0.0, truncated, numbers), guidance.progress, gap
 
@@ -272,14 +311,24 @@ class TorchTask:
         none = torch.zeros_like(state.position[0])
         return none + math.inf, ((none + GAP_LIMIT, none, none),) * self._nearest
 
-    def _start(self, state: TaskState, wanted: Tensor) -> tuple[TaskState, TaskOutcome]:
-        """Everybody at the start of the next episode, on the wanted path or, where it is negative, a drawn one."""
+    def _start(self, state: TaskState, wanted: Tensor, given: Start, checked: Tensor) -> tuple[TaskState, TaskOutcome]:
+        """Everybody at the start of the next episode, on the wanted path or, where it is negative, a drawn one.
+
+        checked: the robots (robots,) whose given start is looked at.
+        """
         bodies, paths = self._place(state.keys, state.episodes, wanted)
         clocks, before = torch.zeros_like(state.clocks), torch.full_like(state.progress, _BEFORE)
+        look = self._look
+        if not given.drawn:
+            bodies, clocks, before, guide = self._moved_to(given, bodies, state, paths, checked)
+            look = partial(self._looked, guide=guide)
         fresh = TaskState(bodies, before, state.room, clocks, paths, state.keys, state.episodes + 1)
         fresh = self._differentiable(fresh)
         nothing = self._empty(self._record_rows, len(clocks)).requires_grad_(fresh.bodies.requires_grad)
-        outcome, progress, room = self._look(fresh.bodies, nothing, clocks, paths, fresh.progress, self.parameters)
+        outcome, progress, room = look(fresh.bodies, nothing, clocks, paths, fresh.progress, self.parameters)
+        if not given.drawn:
+            robots = checked.nonzero()[:, 0]
+            check_free(self.engine, outcome.report[:, robots].detach().cpu().double().numpy(), robots.cpu().numpy())
         fresh = fresh._replace(progress=progress, room=room)
         if self._compiled:
             return fresh.detached(), TaskOutcome(*(tensor.detach() for tensor in outcome))
@@ -300,13 +349,63 @@ class TorchTask:
         seed = episode_seed(keys, episodes)
         drawn = (uniform(seed, 0) * self._paths).long()
         paths = torch.where(wanted < 0, drawn, wanted)
-        x, y = (((2.0 * uniform(seed, i) - 1.0) * self._start_offset).to(self.dtype) for i in (1, 2))
-        turn = (2.0 * uniform(seed, 3) - 1.0) * self._start_turn
+        offset, turn = self._displacement(seed)
+        x, _ = offset
         directions = tuple(self._direction(2.0 * math.pi * uniform(seed, 4 + i)) for i in range(self._joints // 2))
         none = torch.zeros_like(x)
         nowhere = State((none, none), (none, none), (none, none, none), directions)
         guidance = self._guide.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)
-        return torch.stack(pack_state(start(guidance.reference, (x, y), self._direction(turn), directions))), paths
+        return torch.stack(pack_state(start(guidance.reference, offset, turn, directions))), paths
+
+    def _displacement(self, seed: Tensor) -> tuple[tuple[Tensor, Tensor], Direction]:
+        """How far a start lies beside its place, in the reference's frame [m], and its turn."""
+        x, y = (((2.0 * uniform(seed, i) - 1.0) * self._start_offset).to(self.dtype) for i in (1, 2))
+        return (x, y), self._direction((2.0 * uniform(seed, 3) - 1.0) * self._start_turn)
+
+    def _moved_to(
+        self, given: Start, bodies: Tensor, state: TaskState, paths: Tensor, checked: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, TorchGuide]:
+        """Drawn bodies where a start is given, with clocks, progress, and a guide under which progress stays.
+
+        Does what `caster_gym.envs.starts` does with arrays. Raises ValueError for what can be no start.
+        """
+        engine, rows = self.engine, list(bodies.unbind(0))
+        plain, chosen = paths.cpu().numpy(), checked.cpu().numpy()
+        clocks, progress = torch.zeros_like(state.clocks), torch.zeros_like(state.progress)
+        guide, still = engine.plan.guide, self._guide
+        if courses := isinstance(guide, Courses):
+            still = torch_guide(guide._replace(window=0.0), self.dtype, self.device)
+        if given.place is not None:
+            place = given.place.copy()
+            place[chosen] = check_place(engine, plain[chosen], place[chosen])
+            if courses:
+                progress = self._tensor(place)
+            else:
+                check_longest(engine)
+                clocks = torch.as_tensor(np.rint(place / engine.control_period).astype(np.int64), device=self.device)
+            none = torch.zeros_like(rows[0])
+            nowhere = State((none, none), (none, none), (none, none, none), ())
+            reference = still.reference_at(paths, progress if courses else clocks, nowhere)
+            offset, turn = self._displacement(episode_seed(state.keys, state.episodes))
+            rows[:4] = pack_state(start(reference, offset, turn, ()))[:4]
+        if given.pose is not None:
+            x, y, heading = self._tensor(given.pose).unbind(1)
+            rows[:4] = x, y, torch.cos(heading), torch.sin(heading)
+        if given.twist is not None:
+            rows[4:7] = self._tensor(given.twist).unbind(1)
+        if given.steering is not None:
+            angles = self._tensor(given.steering)
+            rows[BODY_ROWS:] = torch.stack((torch.cos(angles), torch.sin(angles)), 2).flatten(1).unbind(1)
+        if given.twist is not None:
+            directions = torch.stack(rows[BODY_ROWS:]).detach().cpu().double().numpy()
+            check_motion(self.robot, np.arctan2(directions[1::2], directions[::2]).T[chosen], given.twist[chosen])
+        if courses and given.pose is not None and given.place is None:
+            before = self._tensor(nearest_row(engine, plain, given.pose[:, :2]))
+            progress = self._guide.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
+        return torch.stack(rows), clocks, progress, still
+
+    def _tensor(self, numbers: NDArray[np.float64]) -> Tensor:
+        return torch.as_tensor(numbers, dtype=self.dtype, device=self.device)
 
     def _direction(self, angle: Tensor) -> Direction:
         return torch.cos(angle).to(self.dtype), torch.sin(angle).to(self.dtype)

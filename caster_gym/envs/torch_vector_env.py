@@ -1,8 +1,10 @@
 """A batch of environments whose observations, actions and rewards never leave the device."""
 
-from collections.abc import Sequence
-from typing import Any
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
+import numpy as np
 import torch
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
@@ -10,7 +12,9 @@ from torch import Tensor
 
 from caster_gym.engines.torch_compiler import replayed
 from caster_gym.engines.torch_scalars import check_memory, listed_robots, parameter_rows, parameters_of
+from caster_gym.envs.inputs import Seeds, check_counts, checked_seeds
 from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, action_space, observation_space
+from caster_gym.envs.starts import read_options, read_start
 from caster_gym.envs.task_engine import DRAW_A_PATH
 from caster_gym.envs.torch_task import TaskName, TaskOutcome, TaskState, TorchTask
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
@@ -54,6 +58,7 @@ class TorchVectorEnv:
         diagnostics: bool = True,
         **fields: Any,
     ) -> None:
+        check_counts(num_envs, max_episode_steps)
         graphs = compile and torch.device(device).type == "cuda"
         self.task = TorchTask(
             task,
@@ -73,22 +78,40 @@ class TorchVectorEnv:
         check_memory(num_envs, 4 * self.task.layout.size, dtype, self.device)
         self.single_observation_space = observation_space(self.task.engine)
         self.single_action_space = action_space(self.task.engine)
-        self._advance = replayed(self._advanced) if self.task.graphs else self._advanced
         self._now: tuple[TaskState, TaskOutcome] | None = None
+        self._replay()
+
+    def _replay(self) -> None:
+        self._advance = replayed(self._advanced) if self.task.graphs else self._advanced
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_advance"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._replay()
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: the parameters of both would be those of one task."""
+        return copy.deepcopy(self)
 
     def reset(
-        self, seed: int | Sequence[int] | None = None, path: Tensor | int = DRAW_A_PATH
+        self, seed: Seeds = None, path: Tensor | int = DRAW_A_PATH, options: Mapping[str, Any] | None = None
     ) -> tuple[Tensor, dict[str, Any]]:
         """Start episodes of all robots; robot i is seeded with seed + i, as in Gymnasium's batches.
 
         Without a seed the robots go on with their sequences of episodes. path: index in the pool, for all or each.
+        options: those of the single environment, with one entry for all robots or one for each, robots in front.
         """
+        given = read_options(options, self.task.engine)
+        start = read_start(given, self.task.engine, np.ones(self.num_envs, dtype=np.bool_))
+        path = given.get("path", path)
         with torch.no_grad():
             if seed is not None or self._now is None:
-                self._now = self.task.begin(self._fresh_keys(seed), path)
+                self._now = self.task.begin(self._fresh_keys(seed), path, start)
             else:
                 everybody = torch.ones(self.num_envs, dtype=torch.bool, device=self.device)
-                self._now = self.task.restart(*self._now, everybody, path)
+                self._now = self.task.restart(*self._now, everybody, path, start)
         outcome = self._now[1]
         return outcome.observations, self.task.info(outcome.report)
 
@@ -109,17 +132,17 @@ class TorchVectorEnv:
 
     @property
     def states(self) -> Tensor:
-        """All states (num_envs, 7 + 2 N), laid out as in `caster_gym.engines.torch_fleet.TorchFleet`."""
+        """A copy of all states (num_envs, 7 + 2 N), laid out as in `caster_gym.engines.torch_fleet.TorchFleet`."""
         if self._now is None:
             raise RuntimeError("reset the batch before its states are read")
-        return self._now[0].bodies.T
+        return self._now[0].bodies.T.clone()
 
     @states.setter
     def states(self, value: Tensor) -> None:
         if self._now is None or tuple(value.shape) != tuple(self.states.shape):
             raise ValueError(f"states must have shape {tuple(self.states.shape)}, got {tuple(value.shape)}")
         state, outcome = self._now
-        bodies = value.to(self.device, self.dtype).T.contiguous()
+        bodies = value.to(self.device, self.dtype, copy=True).T.contiguous()
         self._now = state._replace(bodies=bodies, room=torch.zeros_like(state.room)), outcome
 
     def set_robots(self, robots: Sequence[Robot]) -> None:
@@ -139,7 +162,7 @@ class TorchVectorEnv:
         if tuple(rows.shape) != shape:
             raise ValueError(f"rows must have shape {shape}, got {tuple(rows.shape)}")
         self.task.engine.check_parameters(rows.detach().double().cpu().numpy())
-        self.task.parameters = parameters_of(rows.to(self.device, self.dtype))
+        self.task.parameters = parameters_of(rows.to(self.device, self.dtype, copy=True))
 
     def _advanced(self, state: TaskState, actions: Tensor) -> tuple[TaskState, TaskOutcome, TaskOutcome]:
         state, final = self.task.step(state, actions)
@@ -148,11 +171,9 @@ class TorchVectorEnv:
         state, outcome = self.task.restart(state, final)
         return state, final, outcome
 
-    def _fresh_keys(self, seed: int | Sequence[int] | None) -> Tensor:
+    def _fresh_keys(self, seed: Seeds) -> Tensor:
         """A key for each robot, as Gymnasium's seeding gives it."""
         if seed is None:
             return torch.randint(2**63 - 1, (self.num_envs,), dtype=torch.int64)
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
+        seeds = checked_seeds(seed, self.num_envs)
         return torch.tensor([int(seeding.np_random(one)[0].integers(2**63)) for one in seeds], dtype=torch.int64)

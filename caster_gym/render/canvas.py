@@ -5,12 +5,13 @@ Coordinates and lengths are continuous pixels of the finished frame; `pygame.dra
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from caster_gym.render.palette import Colour
+from caster_gym.render.palette import PAPER, Colour
 from caster_gym.render.pygame_loader import pygame
 from caster_gym.render.view import Area
 
@@ -25,7 +26,17 @@ class Canvas:
 
     def __init__(self, width: int, height: int) -> None:
         self.size = (width, height)
-        self._surface = pygame.Surface((width * SAMPLES, height * SAMPLES), depth=32)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy is blank: surfaces cannot be pickled, and every picture is drawn anew."""
+        return {"size": self.size}
+
+    @cached_property
+    def _surface(self) -> pygame.Surface:
+        """40 MB for a frame of the usual size, which copies that draw nothing do without."""
+        surface = pygame.Surface((self.size[0] * SAMPLES, self.size[1] * SAMPLES), depth=32)
+        surface.fill(PAPER)
+        return surface
 
     def copy_from(self, other: "Canvas") -> None:
         """Take over another canvas of the same size."""
@@ -186,7 +197,11 @@ def rounded_rectangle(length: float, width: float, rounding: float) -> Array:
 
 @lru_cache(maxsize=256)
 def _text(string: str, height: int, colour: Colour) -> pygame.Surface:
-    return _font(height).render(string, True, colour)
+    try:
+        return _font(height).render(string, True, colour)
+    except pygame.error:  # fonts end with pygame.quit(), which other environments call when they are closed
+        _font.cache_clear()
+        return _font(height).render(string, True, colour)
 
 
 @lru_cache(maxsize=16)

@@ -1,9 +1,11 @@
 """From scenes to frames: what the environments' render() shows or returns. Needs pygame-ce."""
 
+import copy
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,11 +51,30 @@ class Viewer:
         self.render_mode, self.size, self.fps, self.follow = render_mode, size, fps, follow
         self.closed = False
         self._canvas = Canvas(*size)
-        self._floor = Canvas(*size)
+        self._floor = _Floor(size)
         self._cells: list[_Cell] = []
         self._picture: pygame.Surface | None = None
         self._window: pygame.Surface | None = None
         self._clock = pygame.time.Clock()
+
+    def beside(self) -> Self:
+        """A viewer for other robots with the same settings, which draws on the same canvases, in turn with this one."""
+        other = copy.copy(self)
+        other._cells = []
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy remembers what it has seen of its robots; pictures are drawn, and windows opened, anew."""
+        return {**vars(self), "_picture": None, "_window": None, "_clock": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._clock = pygame.time.Clock()
+
+    @property
+    def most(self) -> int:
+        """How many robots are shown at once."""
+        return MOST
 
     def show(self, scenes: Sequence[Scene]) -> Frame | None:
         """Draw the scenes of one moment, in the same order each time.
@@ -71,7 +92,7 @@ class Viewer:
         shown = [cell.drawable(scene) for cell, scene in zip(self._cells, shown, strict=True)]
         for cell, scene in zip(self._cells, shown, strict=True):
             cell.take(scene, self._floor, self.follow)
-        self._canvas.copy_from(self._floor)
+        self._canvas.copy_from(self._floor.canvas)
         for cell, scene in zip(self._cells, shown, strict=True):
             cell.draw(scene, self._canvas)
         self._picture = self._canvas.finished()
@@ -103,7 +124,7 @@ class Viewer:
     def _divide(self, count: int) -> None:
         """Give each of so many robots its cell."""
         width, height = self.size
-        self._floor.fill(palette.PAPER)
+        self._floor.clear()
         if count == 1 and width >= WIDE * height:
             panel = min(PANEL * height, 0.5 * width)
             whole = Area(0.0, 0.0, width - panel, height)
@@ -116,7 +137,8 @@ class Viewer:
         self._cells = [_Cell(area.within(gap), None, unit, name) for area, name in zip(cells, names, strict=True)]
 
     def _show_in_window(self, picture: pygame.Surface) -> None:
-        if self._window is None:
+        # any other environment may have quit pygame since, which closes all windows
+        if self._window is None or pygame.display.get_surface() is not self._window:
             if not has_display():
                 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # a window that nobody sees, instead of an error
             pygame.display.init()
@@ -127,6 +149,37 @@ class Viewer:
         if any(event.type == pygame.QUIT for event in pygame.event.get()):  # all are taken, so that none pile up
             self.close()
         self._clock.tick(self.fps)
+
+
+class _Floor:
+    """What stands still, which is drawn when it has changed. Viewers that share it draw in the same areas."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.canvas = Canvas(*size)
+        self._shown: dict[Area, tuple[Scene, View]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"canvas": self.canvas, "_shown": {}}
+
+    def clear(self) -> None:
+        """Leave nothing but paper."""
+        self.canvas.fill(palette.PAPER)
+        self._shown = {}
+
+    def view(self, scene: Scene, cell: "_Cell", follow: float | None) -> View:
+        """How a scene lies in a cell, where its floor has been drawn."""
+        if follow is None and cell.area in self._shown and same_floor(scene, self._shown[cell.area][0]):
+            return self._shown[cell.area][1]
+        if follow is not None:
+            view = around(scene.pose[:2], follow, cell.area)
+        else:
+            view = fitted(*extent(scene), cell.area.within(14.0 * cell.unit)).shown_in(cell.area)
+        draw_floor(self.canvas, view, scene, cell.unit)
+        draw_scale(self.canvas, view, cell.unit)
+        if cell.panel is not None:
+            draw_legend(self.canvas, view, cell.unit)
+        self._shown[cell.area] = scene, view
+        return view
 
 
 class _Cell:
@@ -145,22 +198,11 @@ class _Cell:
             return scene
         return replace(self._last, time=scene.time, failed=True)
 
-    def take(self, scene: Scene, floor: Canvas, follow: float | None) -> None:
+    def take(self, scene: Scene, floor: _Floor, follow: float | None) -> None:
         """Take in a scene, and draw the floor where it has changed."""
         self._history.add(scene)
-        changed = self._last is None or not same_floor(scene, self._last)
         self._last = scene
-        if follow is None and self.view is not None and not changed:
-            return
-        if follow is not None:
-            view = around(scene.pose[:2], follow, self.area)
-        else:
-            view = fitted(*extent(scene), self.area.within(14.0 * self.unit)).shown_in(self.area)
-        self.view = view
-        draw_floor(floor, view, scene, self.unit)
-        draw_scale(floor, view, self.unit)
-        if self.panel is not None:
-            draw_legend(floor, view, self.unit)
+        self.view = floor.view(scene, self, follow)
 
     def draw(self, scene: Scene, canvas: Canvas) -> None:
         """Draw what moves."""

@@ -1,7 +1,8 @@
 """Environments with features: one robot, or a batch, from the same features."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+import copy
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, overload
 
 import gymnasium as gym
 import numpy as np
@@ -11,8 +12,11 @@ from gymnasium.vector.utils import batch_space
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from numpy.typing import NDArray
 
+from caster_gym.envs.inputs import read_actions
+from caster_gym.envs.specification import plain
 from caster_gym.wrappers.feature import Actions, Array, Feature, Flags, Observations
 from caster_gym.wrappers.plants import WheelErrors
+from caster_gym.wrappers.specification import read_features
 from caster_gym.wrappers.stack import Stack
 
 Env: TypeAlias = gym.Env[Any, Any]
@@ -30,10 +34,10 @@ _RUNNING = np.zeros(1, dtype=np.bool_)
 class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """An environment of caster_gym with features; see `wrap`."""
 
-    def __init__(self, env: Env, features: Sequence[Feature] = ()) -> None:
-        RecordConstructorArgs.__init__(self, features=tuple(features))
+    def __init__(self, env: Env, features: Sequence[Feature | Mapping[str, Any]] = ()) -> None:
+        self.features = _checked([read_features([one])[0] if isinstance(one, Mapping) else one for one in features])
+        RecordConstructorArgs.__init__(self, features=plain(self.features))
         gym.Wrapper.__init__(self, env)
-        self.features = _checked(features)
         self._stack = Stack(_engine(env), _task(env), self.features, _space(env.action_space))
         self.action_space = self._stack.action_space
 
@@ -48,7 +52,7 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     def step(self, action: Actions) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
-        given = _checked_actions(action, self.action_space)
+        given = _checked_actions(action, self.action_space, "action")
         observation, task_reward, terminated, truncated, info = self.env.step(self._stack.act(given[None])[0])
         terms = self._stack.score(_batch_of_one(info), {}, _RUNNING, np.array([terminated]))
         numbers = {name: float(term[0]) for name, term in terms.items()}
@@ -57,6 +61,10 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         for number in numbers.values():
             reward += number
         return self._stack.observe(observation[None])[0], reward, terminated, truncated, info
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: both would move the same robot."""
+        return copy.deepcopy(self)
 
 
 class FeatureVectorEnv(AnyVectorWrapper):
@@ -76,8 +84,8 @@ class FeatureVectorEnv(AnyVectorWrapper):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Start episodes of all robots, or of those in options["reset_mask"]."""
-        mask = np.array((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         observations, infos = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]  # a list will do
+        mask = np.array((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         self._begin(mask, observations, infos)
         self._ended = self._ended & ~mask
         nothing = np.zeros(self.num_envs)
@@ -106,6 +114,10 @@ class FeatureVectorEnv(AnyVectorWrapper):
         everyone = np.ones(self.num_envs, dtype=np.bool_)
         _tell(infos, np.where(fresh, 0.0, task_rewards), going_on, everyone)
         return self._shown.copy(), rewards, terminated, truncated, infos
+
+    def __copy__(self) -> Self:
+        """As independent as a deep copy: both would move the same robots."""
+        return copy.deepcopy(self)
 
     def _begin(self, mask: Flags, observations: Observations, infos: dict[str, Any]) -> None:
         """New episodes of some robots."""
@@ -181,13 +193,11 @@ def _space(space: Any) -> "gym.spaces.Box[Any]":
     return space
 
 
-def _checked_actions(actions: Any, space: Any) -> NDArray[np.float32]:
-    given = np.asarray(actions, dtype=np.float32)
-    if given.shape != space.shape:
-        raise ValueError(f"actions must have shape {space.shape}, got {given.shape}")
+def _checked_actions(actions: Any, space: Any, name: str = "actions") -> NDArray[np.float32]:
+    given = read_actions(actions, space.shape, name)
     if np.isnan(given).any():
         raise ValueError(
-            f"actions must hold numbers, got {given[np.isnan(given).any(axis=-1)] if given.ndim > 1 else given}"
+            f"{name} must hold numbers, got {given[np.isnan(given).any(axis=-1)] if given.ndim > 1 else given}"
         )
     return given
 

@@ -1,0 +1,55 @@
+"""The quantities of a report by name, as `CasterTrackEnv` describes them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.envs.block_layout import (
+    CONDITIONING,
+    FIRST_POSE,
+    FIRST_RECORD,
+    FIRST_SITUATION,
+    FIRST_TERM,
+    FIXED_REPORT_ROWS,
+    HEADING_SIN,
+    LEFT_CORRIDOR,
+    NOT_FINITE,
+    POSITION_ERROR,
+    TOUCHED,
+    TRACTION_USE,
+)
+
+_TERMS = slice(FIRST_TERM, FIRST_POSE)
+_TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
+_POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIRST_POSE + 4 : FIRST_POSE + 8]
+_IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
+
+
+def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any]:
+    """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
+
+    Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
+    """
+    row: Any = reports if reports.ndim > 1 else reports.tolist()  # numbers of one robot are Python's own
+    columns = reports.T
+    return {
+        "position_error": row[POSITION_ERROR],
+        "heading_error": row[HEADING_SIN],
+        "reward_terms": dict(zip(terms, row[_TERMS], strict=False)),
+        "torque": columns[_TORQUES],
+        "power": row[FIRST_RECORD],
+        "traction_use": row[TRACTION_USE],
+        "conditioning": row[CONDITIONING],
+        "pose": columns[_POSE],
+        "reference_pose": columns[_REFERENCE_POSE],
+        "progress": row[FIRST_SITUATION],
+        "progress_share": row[FIRST_SITUATION + 1],
+        "clearance": row[FIRST_SITUATION + 2],
+        "impacts": row[FIRST_RECORD + 6],
+        "impulse": columns[_IMPULSE],
+        "normal_impulse": row[FIRST_RECORD + 3],
+        "left_corridor": row[LEFT_CORRIDOR] > 0.0,
+        "not_finite": row[NOT_FINITE] > 0.0,
+        "touched": row[TOUCHED] > 0.0,
+    }

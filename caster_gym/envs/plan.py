@@ -1,0 +1,43 @@
+"""What a task asks of its robots, prepared for the compiled step: paths, rewards, obstacles and pace."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.mechanics.separation import Surroundings
+
+
+class Plan(NamedTuple):
+    """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
+
+    guide: Timetable | Courses
+    names: tuple[str, ...]  # of the paths
+    tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
+    terms: tuple[str, ...]  # names of the reward's terms
+    around: Surroundings
+    arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
+    descriptions: tuple[str, ...]  # what was made of each path
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Self:
+        """Itself: nobody writes into its tables, which the environments of a process share."""
+        return self
+
+
+class Pace(NamedTuple):
+    """What the engine needs to know of a task."""
+
+    substeps: int
+    time_step: float  # [s]
+    corridor: float  # [m]
+    start_offset: float  # [m]
+    start_turn: float  # [rad]
+
+
+def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """All tables of paths in one (rows, columns), with each one's first and last row (paths, 2)."""
+    lengths = np.array([len(table) for table in tables])
+    ends = np.cumsum(lengths)
+    return np.ascontiguousarray(np.concatenate(tables)), np.stack([ends - lengths, ends - 1], axis=1).astype(np.int64)

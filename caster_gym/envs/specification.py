@@ -1,0 +1,31 @@
+"""Gymnasium's specification of an environment in plain values, which JSON can hold and `gymnasium.make` read again."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from pydantic import BaseModel
+
+
+def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
+    """The specification with the objects among its keywords as mappings, lists, numbers and words."""
+    return spec if spec is None else replace(spec, kwargs={name: plain(value) for name, value in spec.kwargs.items()})
+
+
+def plain(value: Any) -> Any:
+    """What a robot, a path or any other part of a description is in YAML; what has no such form stays as it is."""
+    if isinstance(value, BaseModel):
+        return {name: plain(getattr(value, name)) for name in type(value).model_fields}
+    if isinstance(value, Mapping):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Enum):
+        return value.value
+    return fspath(value) if isinstance(value, PathLike) else value
