@@ -22,6 +22,8 @@ OBJECTS = {
     "path": {"path": Circle(radius=0.5)},
     "paths": {"path": (Circle(radius=0.5), "lemniscate", {"shape": "circle", "radius": np.float64(0.4)})},
     "arena": {"arena": read_arena({"room": [[-3.0, -3.0], [3.0, 3.0]]}), "path": {"shape": "circle", "radius": 0.5}},
+    "trajectory": {"path": Circle(radius=0.5).trajectories(0.02)[0]},
+    "array of points": {"path": np.array([[0.0, 0.0], [0.5, 0.1], [1.0, 0.4]])},
     "array": {"preview": np.array([0.1, 0.2, 0.4])},
     "robot and path": {
         "robot": ROBOT,

@@ -38,11 +38,16 @@ def _check_count(name: str, count: Any) -> None:
         raise ValueError(f"{name} must be 1 or more, got {count}")
 
 
-def check_keywords(given: Iterable[str], known: Iterable[str], owner: str) -> None:
-    """Refuse keywords that a constructor does not know, in Python's words and with the nearest one that it does."""
+def check_keywords(given: Iterable[str], known: Iterable[str], owner: str, usual: Mapping[str, str]) -> None:
+    """Refuse keywords that a constructor does not know, in Python's words and with the nearest one that it does.
+
+    usual: as `Frozen.usual_names`, what other libraries call its keywords.
+    """
     names = sorted(known)
     if unknown := [name for name in given if name not in names]:
-        told = "; ".join(f"unexpected keyword argument {name!r}; {did_you_mean(name, names)}" for name in unknown)
+        told = "; ".join(
+            f"unexpected keyword argument {name!r}; {did_you_mean(name, names, usual)}" for name in unknown
+        )
         raise UnexpectedKeywordError(f"{owner} got an {told}")
 
 

@@ -58,7 +58,7 @@ def track_engine(
 
     longest: greatest number of control periods of an episode.
     """
-    check_keywords(fields, (*KEYWORDS, *TrackTask.model_fields), "CasterTrack")
+    check_keywords(fields, (*KEYWORDS, *TrackTask.model_fields), "CasterTrack", TrackTask.usual_names)
     chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
@@ -77,7 +77,7 @@ def follow_engine(
     longest: int | None = None,
 ) -> tuple[TaskEngine, FollowTask]:
     """The same for the following task."""
-    check_keywords(fields, (*KEYWORDS, *FollowTask.model_fields), "CasterFollow")
+    check_keywords(fields, (*KEYWORDS, *FollowTask.model_fields), "CasterFollow", FollowTask.usual_names)
     chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)

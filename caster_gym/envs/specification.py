@@ -10,6 +10,9 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from pydantic import BaseModel
 
+from caster_gym.paths.timed import timed_from
+from caster_gym.paths.trajectory import Trajectory
+
 
 def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
     """The specification with the objects among its keywords as mappings, lists, numbers and words."""
@@ -18,6 +21,8 @@ def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
 
 def plain(value: Any) -> Any:
     """What a robot, a path or any other part of a description is in YAML; what has no such form stays as it is."""
+    if isinstance(value, Trajectory):
+        return plain(timed_from(value))
     if isinstance(value, BaseModel):
         return {name: plain(getattr(value, name)) for name in type(value).model_fields}
     if isinstance(value, Mapping):
