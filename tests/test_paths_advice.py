@@ -70,7 +70,7 @@ def test_a_path_of_too_many_steps_is_accepted_once_it_is_as_short_as_its_message
     assert read_paths({"shape": "circle", "duration": longest})[0].trajectories(step)
 
 
-NOISY = [(x + 0.02 * np.sin(700.0 * x), np.sin(x) + 0.03 * np.cos(900.0 * x)) for x in np.linspace(0.0, 2.0, 300)]
+NOISY = [(x + 0.008 * np.sin(700.0 * x), np.sin(x) + 0.016 * np.cos(900.0 * x)) for x in np.linspace(0.0, 2.0, 300)]
 
 NO_COURSE = [
     {"shape": "circle", "radius": 1e-9},
@@ -83,7 +83,7 @@ NO_COURSE = [
     {"shape": "rounded_square", "side": 1e-3, "rounding": 1e-4},
     {"shape": "random_paths", "count": 20},
     {"shape": "random_paths", "count": 3, "extent": 1e-3},
-    turning(300),
+    turning(600),
     spline((1, 1)),
     spline((0, 0, 0), (0, 0, 1)),
     spline((0, 0), (1, 0), (0, 0)),
