@@ -48,7 +48,7 @@ TOO_FAST = [
     turning(30),
     turning(300),
     spline((0, 0), (1, 0), (0, 0)),
-    spline((0, 0, 0), (1, 0, 300)),
+    spline((0, 0, 0), (1, 0, 300), unit="rad"),
     spline((0, 0, 0), (0, 0, 1), duration=0.1),
     spline((0, 0, 0), (1, 0, 0), (1, 0, 1), (2, 0, 1), duration=0.5),
     {"shape": "random_paths", "count": 20, "duration": 5.0, "max_speed": 5.0, "max_acceleration": 20.0},

@@ -13,7 +13,7 @@ from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 from caster_gym.paths.trajectory import Array, Plane
 
-_LEAST_DEGREES = 45.0  # [rev] as many revolutions on one path are degrees
+_EIGHTH = 45.0  # [deg] numbers of revolutions that are twice that or more, and multiples of it, are degrees
 
 Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first three derivatives
 
@@ -82,10 +82,10 @@ class Spinning(_Kind):
 
     @model_validator(mode="after")
     def _turns_are_no_degrees(self) -> Self:
-        if abs(self.turns) >= _LEAST_DEGREES:
+        if abs(self.turns) >= 2.0 * _EIGHTH and self.turns % _EIGHTH == 0.0:
             raise ValueError(
-                f"'turns' counts revolutions, of which {self.turns:g} are too many; if that is in degrees, "
-                f"write {self.turns / 360.0:.6g}"
+                f"'turns' counts revolutions, and {self.turns:g} looks like degrees; if it is, write "
+                f"{self.turns / 360.0:.6g}, got {self.turns:g}"
             )
         return self
 
