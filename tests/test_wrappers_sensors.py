@@ -196,11 +196,11 @@ def test_wrong_numbers_are_refused(feature, message):
 
 
 def test_known_zeros_turn_the_shown_angles_of_their_casters():
-    zeros = (0.02, -0.03, 0.1)
-    shown, true = (moving(batch(*one, count=3)) for one in ([SteeringOffset(angle=0.0, zeros=zeros)], []))
-    place = batch(count=1).unwrapped.engine.layout.parts
-    directions = next(part.place for part in place if part.name == "directions")
-    angles = [rows[:, directions].reshape(3, -1, 2) @ [1.0, 1.0j] for rows in (shown, true)]
+    zeros, angles = (0.02, -0.03, 0.1), []
+    for features in ([SteeringOffset(angle=0.0, zeros=zeros)], []):
+        env = batch(*features, count=3)
+        part = env.unwrapped.engine.layout.physical(moving(env), "directions")
+        angles.append(part[:, ::2] + 1j * part[:, 1::2])
     assert_allclose(np.angle(angles[0] / angles[1]), np.tile(zeros, (3, 1)), atol=1e-6)  # float32
     with pytest.raises(ValueError, match="as many zeros as robot 'chung2008' has casters, 3, or none, got 2"):
         batch(SteeringOffset(zeros=(0.1, 0.2)), count=1)

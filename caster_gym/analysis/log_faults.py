@@ -35,7 +35,8 @@ def held_columns(recording: Recording) -> Finding | None:
     name = groups[slow]
     return Finding(
         f"{slow} change only in every {_ordinal(rates[slow])} row, all together, while others change more often: "
-        "they are old values that are written again. To mend it, interpolate them between the rows in which they change.",
+        "they are old values that are written again. To mend it, interpolate them between the rows in which they "
+        "change.",
         Mend(
             f"{slow} are held",
             "interpolate them between the rows in which they change",
