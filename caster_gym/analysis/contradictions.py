@@ -22,8 +22,8 @@ class Finding(NamedTuple):
     mend: Mend | None
 
 
-def size_words(sizes: Sequence[Size], robot: Robot) -> str:
-    """What differs from the robot file, by how much, and what to do about it."""
+def size_words(sizes: Sequence[Size], robot: Robot, names: Sequence[str] = ()) -> str:
+    """What differs from the robot file, by how much, and what to do about it beside estimating the named unknowns."""
     factors = [size for size in sizes if size.name.startswith(("vx", "yaw"))]
     parts = [
         f"{size.name} {'are' if ' and ' in size.name else 'is'} {1.0 / size.shown:.4g} times what the poses show "
@@ -37,7 +37,7 @@ def size_words(sizes: Sequence[Size], robot: Robot) -> str:
         parts.append(f"{size.name} is {size.shown:.5g} ± {half:.1g} {unit}, not {size.described:.5g} {unit}")
     words = "The recording contradicts what is known of the robot: as rolling shows, " + "; ".join(parts) + "."
     if own:
-        asked = " ".join(f"--unknown {size.name}" for size in own)
+        asked = " ".join(f"--unknown {name}" for name in (*names, *(size.name for size in own)))
         given = ", ".join(f"{size.name}: {size.shown:.5g}" for size in own)
         words += f" Estimate this too, with {asked}, or say that it is known, with --set 'start={{{given}}}'."
     return words

@@ -35,6 +35,7 @@ _INTEGRATION = 1e-5  # [-] of a law's own size, squared: what samples far apart 
 _NOTHING_IN_COMMON = 0.5  # [-] of both sides of a law that is left, from which it tells no size
 _TOO_FAST = 3.0  # times the top speed
 _ROWS_FOR_NOISE = 1000
+_ASIDE = 1e-3  # [-] of its way by which a wheel may seem to go aside
 
 
 class Law(NamedTuple):
@@ -182,7 +183,8 @@ def _steering(parts: _Parts, robot: Robot) -> tuple[list[Law], list[Size]]:
             found = np.array([d, 0.0])
         else:
             zero = math.atan(found[1])
-        law = _law((f"steering_{i + 1}",), across + found[1] * along, found[0] * turned, noise)
+        aside = (_ASIDE * along) ** 2  # where the robot goes straight, next to nothing is left of either side
+        law = _law((f"steering_{i + 1}",), across + found[1] * along, found[0] * turned, noise + aside)
         known = not law.silent and law.misfit < _NOTHING_IN_COMMON
         laws.append(law)
         sizes.append(Size(f"trail_{i + 1}", d, found[0] * math.cos(zero) if known else d, math.sqrt(covariance[0, 0])))

@@ -58,7 +58,7 @@ def check_recording(
     sizes = [size for size in different(as_true, believed) if not _is_asked(size.name, names)]
     coarse = [size for size in sizes if _is_coarse(size)]
     if coarse:
-        raise ContradictionError(size_words(coarse, believed) + _ANYHOW)
+        raise ContradictionError(size_words(coarse, believed, names) + _ANYHOW)
     return (small_words(sizes),) if sizes else ()
 
 
