@@ -138,7 +138,7 @@ def test_what_is_not_told_is_said_and_has_no_interval(short, tmp_path):
     rows = short.read_text().splitlines()
     time = [row.split(",")[0] for row in rows]
     first = rows[1].split(",")[1:]
-    still.write_text("\n".join([rows[0], *(",".join([t, *first[:3], "0", "0", "0", *first[6:9], *["0"] * 6])
+    still.write_text("\n".join([rows[0], *(",".join([t, *first[:3], "0", "0", "0", *first[6:9], *["0"] * 9])
                                           for t in time[1:])]))  # fmt: skip
     robot = load_robot("chung2008")
     found = estimate(robot, read_recording(still, robot), PAYLOAD[:1])

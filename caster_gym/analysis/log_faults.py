@@ -69,7 +69,7 @@ def _interpolated(columns: Array) -> Array:
 
 def torques_missing(recording: Recording) -> Finding | None:
     """A robot that speeds up without a torque: a log of drives that tell no effort."""
-    if recording.torque.any() or not recording.pose.any():
+    if recording.torque.any():
         return None
     width = max(len(recording.pose) // _WINDOWS_OF_SPEED, 1)
     steps = np.diff(recording.pose[::width, :2], axis=0)
@@ -77,7 +77,7 @@ def torques_missing(recording: Recording) -> Finding | None:
     gained = speeds - np.minimum.accumulate(speeds)
     last = int(gained.argmax())
     noise = math.sqrt(2.0) * white_noise(recording.pose[:, :2]) / (width * recording.time_step)
-    if gained[last] < max(0.5 * speeds.max(), _SURE * noise):
+    if gained[last] <= max(0.5 * speeds.max(), _SURE * noise):
         return None
     return Finding(
         f"All torques are zero, though the robot speeds up from {speeds[: last + 1].min():.3g} to {speeds[last]:.3g} "
