@@ -225,8 +225,10 @@ def identify(
         list[str] | None,
         typer.Option(
             help="What to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
-            "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail. Without it: mass and place of a "
-            "payload."
+            "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail, radius, steering_zero, "
+            "roll_strength, steer_strength (of all casters, or as radius_2 of one; radii, trails, steering_zeros of "
+            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Without it: mass and place "
+            "of a payload."
         ),
     ] = None,
     example: Annotated[Path | None, typer.Option(help="Write an example recording to this CSV file instead.")] = None,
@@ -238,7 +240,7 @@ def identify(
         typer.Option("--set", help="Change a setting, e.g. --set window=0.5 or --set 'noise={position: 0.001}'."),
     ] = None,
 ) -> None:
-    """Payload, friction and trail of a robot from a recording: estimates with intervals, a page and a robot file."""
+    """Payload, friction, wheels, motors and zeros of a robot from a recording, with intervals, and a robot file."""
     with plain_errors(NOTHING_WRITTEN):
         from .identify import PAYLOAD, read_identify, write_example
         from .identify import identify as run

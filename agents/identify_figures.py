@@ -15,7 +15,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_NAMES = {"position": "x", "heading": "heading", "velocity": "vx", "yaw_rate": "yaw rate", "steering": "steering 1"}
+_NAMES = {
+    "position": "x",
+    "heading": "heading",
+    "velocity": "vx",
+    "yaw_rate": "yaw rate",
+    "steering": "steering 1",
+    "rolling": "rolling 1",
+}
 _FEWEST_SHOWN = 3.0  # times the greatest error left that an axis of errors shows at least
 
 

@@ -1,6 +1,7 @@
 """caster_gym.agents.identify: what the command reads and what it leaves behind."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import yaml
 
 from caster_gym.agents.identify import (
     PAYLOAD,
+    features_yaml,
     identify,
     in_words,
     number_words,
@@ -19,8 +21,11 @@ from caster_gym.agents.identify import (
 )
 from caster_gym.analysis.identification import identify as estimate
 from caster_gym.analysis.recording import read_recording
+from caster_gym.analysis.recording_check import ContradictionError
+from caster_gym.analysis.unknowns import unknowns
 from caster_gym.configuration import ConfigurationError
 from caster_gym.robot import load_robot
+from caster_gym.wrappers import read_features
 
 FILES = [".caster-gym", "identified.csv", "identified.md", "identified.png", "robot.yaml", "run.yaml"]
 NAMES = ("payload_mass", "scrub")
@@ -90,6 +95,33 @@ def test_the_files_hold_the_numbers_of_the_identification(found, short, settings
     assert run["recording"] == str(short)
 
 
+def test_a_contradiction_is_refused_with_the_files_name_and_can_be_overruled(short, settings, tmp_path):
+    header, *lines = short.read_text(encoding="utf-8").splitlines()
+    place = header.split(",").index("steering_1 [rad]")
+    rows = [line.split(",") for line in lines]
+    for row in rows:
+        row[place] = str(-float(row[place]))
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("\n".join([header, *map(",".join, rows)]) + "\n", encoding="utf-8")
+    with pytest.raises(ContradictionError, match=r"wrong\.csv: .*steering_1 has the other sign.*--set check=false"):
+        identify(wrong, settings, tmp_path / "out", False)
+    assert not (tmp_path / "out").exists()
+
+
+def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
+    told = replace(
+        found,
+        unknowns=unknowns(load_robot("chung2008"), ("steering_zero_2", "motor_lag", "torque_delay")),
+        estimates=np.array([0.02, 0.03, 0.004]),
+        deviations=np.ones(3),
+    )
+    text = features_yaml(told, short)
+    offset, lag = read_features(yaml.safe_load(text))
+    assert (offset.angle, offset.zeros, lag.time_constant) == (0.0, (0.0, 0.02, 0.0), 0.03)
+    assert "# torque_delay: 0.004 s" in text
+    assert features_yaml(found, short) == ""
+
+
 def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(found, short, tmp_path):
     (tmp_path / "robot.yaml").write_text(robot_yaml(found, short), encoding="utf-8")
     robot, original = load_robot(tmp_path / "robot.yaml"), load_robot("chung2008")
@@ -106,7 +138,7 @@ def test_what_is_not_told_is_said_and_has_no_interval(short, tmp_path):
     rows = short.read_text().splitlines()
     time = [row.split(",")[0] for row in rows]
     first = rows[1].split(",")[1:]
-    still.write_text("\n".join([rows[0], *(",".join([t, *first[:3], "0", "0", "0", *first[6:9], *["0"] * 6])
+    still.write_text("\n".join([rows[0], *(",".join([t, *first[:3], "0", "0", "0", *first[6:9], *["0"] * 9])
                                           for t in time[1:])]))  # fmt: skip
     robot = load_robot("chung2008")
     found = estimate(robot, read_recording(still, robot), PAYLOAD[:1])

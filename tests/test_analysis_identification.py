@@ -1,5 +1,7 @@
 """caster_gym.analysis.identification: the truth is found, its intervals hold it, and what cannot be told is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -9,6 +11,7 @@ from caster_gym.analysis.recording import Noise, Recording, record
 from caster_gym.analysis.unknowns import robot_with
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import load_robot
+from tests.random_robots import random_robot
 
 CHUNG = load_robot("chung2008")
 NOISE = Noise(position=1e-3, heading=2e-3, velocity=1e-2, yaw_rate=1e-2, steering=2e-3)
@@ -68,6 +71,77 @@ def test_a_recording_of_finer_time_steps_is_told_within_one_percent():
     recording = Recording(0.02, states[:, :3], states[:, 6:], coarse.torque, states[:, 3:6])
     found = identify(CHUNG, recording, tuple(truth))
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-2)
+
+
+ZEROS = {"steering_zero_1": 0.014, "steering_zero_2": -0.02, "steering_zero_3": 0.008}
+
+
+@pytest.mark.parametrize("with_rolling", [True, False])
+def test_radius_and_steering_zeros_are_found_without_noise(with_rolling):
+    truth = {"radius": 0.0256, **ZEROS}
+    recording = record(robot_with(CHUNG, {"radius": 0.0256}), 2.0, 0.02, seed=5, with_rolling=with_rolling)
+    recording = replace(recording, steering=recording.steering + list(ZEROS.values()))
+    found = identify(CHUNG, recording, tuple(truth))
+    assert_allclose(found.estimates, list(truth.values()), rtol=1e-4, atol=1e-5)  # where the fit settles
+    assert found.warnings == ()
+    assert {caster.radius for caster in found.robot.casters} == {float(found.estimates[0])}
+
+
+def test_straight_motion_by_hand_tells_mass_radius_and_zeros():
+    """Newton's law by hand: (m + Σ (I_s + J)/r²) v̇ = Σ τ / r, torques held, so that ways are parabolas; θ = x / r."""
+    radius, load, count, step = 0.0262, 1.3, 80, 0.02
+    casters = CHUNG.casters
+    mass = CHUNG.platform.mass + load + sum(one.wheel.mass + one.link.mass for one in casters)
+    mass += sum(one.wheel.spin_inertia + one.roll.armature for one in casters) / radius**2
+    torque = np.zeros((count, 6))
+    torque[:, ::2] = 0.08 * np.sin(np.linspace(0.0, 6.0, count))[:, None]
+    acceleration = torque.sum(axis=1) / radius / mass
+    speed = np.concatenate([[0.0], np.cumsum(acceleration[:-1] * step)])
+    way = np.concatenate([[0.0], np.cumsum(speed[:-1] * step + 0.5 * acceleration[:-1] * step**2)])
+    nothing = np.zeros(count)
+    steering = np.tile(list(ZEROS.values()), (count, 1))
+    recording = Recording(
+        step,
+        np.column_stack([way, nothing, nothing]),
+        steering,
+        torque,
+        np.column_stack([speed, nothing, nothing]),
+        np.tile(way[:, None] / radius, (1, 3)),
+    )
+    truth = {"payload_mass": load, "radius": radius, **ZEROS}
+    found = identify(CHUNG, recording, tuple(truth))
+    assert found.untold == ()
+    assert_allclose(found.estimates, list(truth.values()), rtol=1e-4, atol=1e-5)  # where the fit settles
+
+
+def test_casters_of_different_sizes_keep_them_while_something_else_is_identified():
+    robot = random_robot(3, 2)
+    assert robot.casters[0].trail != robot.casters[1].trail
+    mass = 0.2 * robot.platform.mass
+    recording = record(robot_with(robot, {"payload_mass": mass}), 2.0, 0.02, seed=1)
+    found = identify(robot, recording, ("payload_mass",))
+    assert_allclose(found.estimates, mass, rtol=1e-6)
+    assert found.robot.casters == robot.casters
+
+
+def test_what_is_hardly_told_apart_is_named_with_its_correlation():
+    """Straight ahead a force moves masses; friction that is known parts torques from them, a little."""
+    robot = robot_with(CHUNG, {"roll_viscous": 2e-4})
+    count = 100
+    torque = np.zeros((count, 6))
+    torque[:, ::2] = 0.08 * np.sin(np.linspace(0.0, 6.0, count))[:, None]
+    states = Model(robot).simulate(np.zeros(9), np.repeat(torque[:-1], 2, axis=0), 0.01, 198)[::2]
+    recording = Recording(0.02, states[:, :3], states[:, 6:], torque, states[:, 3:6])
+    quiet = Noise(position=1e-6, heading=1e-6, velocity=1e-5, yaw_rate=1e-5, steering=1e-6)
+    still = {"payload_mass": 0.1}
+    found = identify(
+        robot, recording.noisy(quiet, np.random.default_rng(0)), ("payload_mass", "roll_strength"), still, window=0.5
+    )
+    correlation = found.correlations[0, 1]
+    assert correlation > 0.98
+    (note,) = found.notes
+    assert note.startswith("payload_mass and roll_strength are hardly told apart")
+    assert f"a correlation of {correlation:+.3f}," in note
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

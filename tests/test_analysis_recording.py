@@ -53,8 +53,8 @@ def test_only_driven_joints_push_and_none_beyond_its_limit():
 
 
 def test_noise_has_the_size_that_was_asked_for_in_each_kind():
-    recording = record(ROBOT, 10.0, 0.02, seed=0)
-    sizes = {"position": 0.1, "heading": 0.2, "velocity": 0.3, "yaw_rate": 0.4, "steering": 0.5}
+    recording = record(ROBOT, 10.0, 0.02, seed=0, with_rolling=True)
+    sizes = {"position": 0.1, "heading": 0.2, "velocity": 0.3, "yaw_rate": 0.4, "steering": 0.5, "rolling": 0.6}
     errors = recording.noisy(Noise(**sizes), np.random.default_rng(0)).measured - recording.measured
     expected = [sizes[recording.kinds[i]] for i in recording.observed]
     assert_allclose(errors.std(axis=0), expected, rtol=0.15)  # 501 samples: four standard deviations are 13 %

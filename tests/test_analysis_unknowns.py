@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.analysis.unknowns import UNITS, parameters_with, robot_with, unknowns, values_of
+from caster_gym.analysis.unknowns import PARAMETERS, SIGNED, UNITS, parameters_with, robot_with, unknowns, value_of
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.robot import load_robot
+from caster_gym.wrappers.latency import ActionDelay, MotorLag
+from caster_gym.wrappers.plants import Friction, Payload, WheelErrors
+from caster_gym.wrappers.pushes import Pushes
+from caster_gym.wrappers.sensors import SensorNoise, SteeringOffset
 from tests.random_robots import random_robot
 
 ROBOT = load_robot("tidybot2")
@@ -21,6 +25,7 @@ VALUES = {
     "steer_coulomb": 0.15,
     "scrub": 0.03,
     "trail": 0.0145,
+    "radius": 0.05,
 }
 
 
@@ -43,12 +48,13 @@ def test_a_load_adds_its_mass_its_moments_and_its_inertia_about_any_point(mass):
 
 
 def test_values_of_the_file_change_nothing():
-    assert parameters_with(ROBOT, values_of(ROBOT)) == robot_parameters(ROBOT)
-    assert robot_with(ROBOT, values_of(ROBOT)) == ROBOT
+    values = {name: value_of(ROBOT, name) for name in UNITS}
+    assert parameters_with(ROBOT, values) == robot_parameters(ROBOT)
+    assert robot_with(ROBOT, values) == ROBOT
 
 
 def test_the_robot_with_values_has_the_parameters_with_them():
-    assert set(VALUES) == set(UNITS)
+    assert set(VALUES) == set(PARAMETERS)
     changed = robot_with(ROBOT, VALUES)
     assert_allclose(
         pack_parameters(robot_parameters(changed)), pack_parameters(parameters_with(ROBOT, VALUES)), rtol=1e-15
@@ -69,7 +75,7 @@ def test_starts_are_the_files_numbers_unless_given():
     trail, scrub, mass = unknowns(ROBOT, names, {"scrub": 0.05}, {"payload_mass": (0.0, 20.0)})
     assert (trail.start, scrub.start, mass.bounds) == (0.014008, 0.05, (0.0, 20.0))
     assert [one.unit for one in (trail, scrub, mass)] == ["m", "N m s/rad", "kg"]
-    assert all(one.bounds[0] < one.start < one.bounds[1] for one in unknowns(ROBOT, tuple(UNITS)))
+    assert all(one.bounds[0] <= one.start < one.bounds[1] for one in unknowns(ROBOT, tuple(UNITS)))
 
 
 @pytest.mark.parametrize(
@@ -80,6 +86,15 @@ def test_starts_are_the_files_numbers_unless_given():
         (("trail", "trail"), {}, {}, "named twice"),
         (("trail",), {"trail": 0.5}, {}, "trail must start between its bounds"),
         (("trail",), {}, {"trail": (-0.1, 0.1)}, "lower bound of the trail must be positive"),
+        (("radius_1",), {}, {"radius": (0.0, 0.1)}, "lower bound of the radius_1 must be positive"),
+        (("motor_lag",), {}, {"motor_lag": (-0.1, 0.1)}, "lower bound of motor_lag must not be negative"),
+        (("radius_5",), {}, {}, "has 4 casters, from radius_1 to radius_4"),
+        (("radius", "radius_2"), {}, {}, "'radius' is one number that all casters share and 'radius_2'"),
+        (("floor_friction",), {}, {}, "no recording tells 'floor_friction': wheels that roll without slip"),
+        (("position_bias",), {}, {}, "no recording tells 'position_bias'"),
+        (("pushes",), {}, {}, "no recording tells 'pushes'"),
+        (("latency",), {}, {}, "did you mean 'torque_delay'"),
+        (("wheel_radius",), {}, {}, "did you mean 'radius'"),
     ],
 )
 def test_unknowns_that_make_no_sense_are_refused(names, starts, bounds, words):
@@ -90,3 +105,36 @@ def test_unknowns_that_make_no_sense_are_refused(names, starts, bounds, words):
 def test_an_impossible_robot_is_refused_by_name():
     with pytest.raises(ValueError, match=r"robot 'tidybot2' as identified: 'platform.mass'"):
         robot_with(ROBOT, {"payload_mass": -60.0})
+
+
+def test_a_caster_of_its_own_is_changed_alone_and_groups_name_each():
+    robot = robot_with(ROBOT, {"radius": 0.05, "radius_2": 0.06, "trail_4": 0.02, "roll_strength_1": 0.5})
+    assert [caster.radius for caster in robot.casters] == [0.05, 0.06, 0.05, 0.05]
+    assert [caster.trail for caster in robot.casters] == [0.014008] * 3 + [0.02]
+    torque = ROBOT.casters[0].roll.max_torque
+    assert [caster.roll.max_torque for caster in robot.casters] == [0.5 * torque] + [torque] * 3
+    named = [one.name for one in unknowns(ROBOT, ("radii", "steering_zeros"), {"radius": 0.051})]
+    assert named == [f"{kind}_{i}" for kind in ("radius", "steering_zero") for i in (1, 2, 3, 4)]
+    assert [one.start for one in unknowns(ROBOT, ("radii",), {"radius": 0.051})] == [0.051] * 4
+
+
+def test_all_that_wrappers_disturb_can_be_asked_for_or_is_explained():
+    """Every field of features of plants, sensors and drives is an unknown, leads to one, or says why not."""
+    fields = [
+        name
+        for feature in (Payload, Friction, WheelErrors, SteeringOffset, SensorNoise, ActionDelay, MotorLag, Pushes)
+        for name in (feature.model_fields["kind"].default, *feature.model_fields)
+        if name != "kind"
+    ]
+    for name in fields:
+        try:
+            unknowns(ROBOT, (name,))
+        except ValueError as error:
+            if "no recording tells" in str(error):
+                continue
+            advised = str(error).split("did you mean ")[1].split("'")[1]
+            unknowns(ROBOT, (advised,))  # the advice helps
+
+
+def test_units_and_signs_speak_of_known_names():
+    assert set(SIGNED) < set(UNITS)

@@ -67,7 +67,7 @@ def test_a_rotation_in_degrees_is_refused_with_its_radians(shape):
 
 
 def test_turns_in_degrees_are_refused_with_their_number():
-    with pytest.raises(ConfigurationError, match=r"'turns' counts revolutions, and 720 looks like degrees; if it is, write 2"):
+    with pytest.raises(ConfigurationError, match="and 720 looks like degrees; if it is, write 2"):
         read_paths({"shape": "circle", "heading": {"kind": "spinning", "turns": 720}})
 
 

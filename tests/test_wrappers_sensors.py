@@ -193,3 +193,14 @@ def test_no_noise_is_no_change():
 def test_wrong_numbers_are_refused(feature, message):
     with pytest.raises(ConfigurationError, match=message):
         read_features([feature])
+
+
+def test_known_zeros_turn_the_shown_angles_of_their_casters():
+    zeros, angles = (0.02, -0.03, 0.1), []
+    for features in ([SteeringOffset(angle=0.0, zeros=zeros)], []):
+        env = batch(*features, count=3)
+        part = env.unwrapped.engine.layout.physical(moving(env), "directions")
+        angles.append(part[:, ::2] + 1j * part[:, 1::2])
+    assert_allclose(np.angle(angles[0] / angles[1]), np.tile(zeros, (3, 1)), atol=1e-6)  # float32
+    with pytest.raises(ValueError, match="as many zeros as robot 'chung2008' has casters, 3, or none, got 2"):
+        batch(SteeringOffset(zeros=(0.1, 0.2)), count=1)

@@ -13,20 +13,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.analysis.recording import KIND_UNITS, Noise, Recording
+from caster_gym.analysis.recording_check import check_recording
 from caster_gym.analysis.shooting import Shooting
-from caster_gym.analysis.unknowns import SIGNED, Unknown, check_alike, check_names, robot_with, unknowns, values_of
+from caster_gym.analysis.unknowns import (
+    CONFIDENCE,
+    SIGNED,
+    WINDOW,
+    Unknown,
+    check_alike,
+    check_names,
+    each_named,
+    kind_of,
+    robot_with,
+    unknowns,
+)
 from caster_gym.analysis.window_fit import Fit, Normal, Told, fit, point_at
 from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
 
-WINDOW = 1.0  # [s]
-CONFIDENCE = 0.95
 _SHORT = 0.25  # [-] of a window, for a first fit that far starting values do not lead astray
 _LEAST_NOISE = 1e-9  # [m, rad, …] standard deviation below which rounding and time steps decide
 _EXACT = 1e-5  # [-] of a quantity's own variation: errors so small are those of time steps, not of a sensor
 _SURE = 4.0  # standard deviations beyond which chance no longer explains a misfit
+_ENTANGLED = 0.98  # [-] correlation from which two estimates are said to be entangled
 _PART = 0.1  # [-] share of a direction from which an unknown takes part in it
 
 
@@ -56,6 +67,7 @@ class Identification:
     agreements: tuple[Agreement, ...]
     untold: tuple[str, ...]  # sentences: what the recording cannot tell
     warnings: tuple[str, ...]  # sentences: what the intervals do not cover
+    notes: tuple[str, ...]  # sentences: small contradictions, and what is told apart only just
     shooting: Shooting
     before: Array  # (W, S, observed) predicted with the starting values, from the same initial states
     after: Array  # (W, S, observed) predicted with the estimates
@@ -78,18 +90,21 @@ def identify(
     confidence: float = CONFIDENCE,
     dynamics: Dynamics = "exact",
     report: Callable[[], None] = lambda: None,
+    check: bool = True,
 ) -> Identification:
     """The named unknowns of a robot, from a recording of it.
 
     starts: values that differ from the robot file's, also of a payload that is known and not an unknown. noise:
     standard deviations that are known; the others are estimated. window [s]. report is called before each step.
+    check: whether to look first for columns that contradict each other, see `caster_gym.analysis.recording_check`.
     Raises ValueError for names that are not known, a recording of another number of casters, a window that is not
     positive and a confidence that does not lie between 0 and 1.
     """
     starts, width = dict(starts or {}), _quantile(confidence)
     if not window > 0.0:
         raise ValueError(f"the window must be positive, got {window:g} s")
-    check_names([*starts, *(bounds or {})])
+    names = each_named(robot, names)
+    check_names([*starts, *(bounds or {})], robot)
     chosen = unknowns(robot, names, starts, bounds)
     check_alike(robot, [*names, *starts])
     if recording.steering.shape[1] != robot.caster_count:
@@ -97,13 +112,13 @@ def identify(
             f"the recording has {recording.steering.shape[1]} steering angles, but robot {robot.name!r} has "
             f"{robot.caster_count} casters"
         )
-    known = {**values_of(robot), **starts}
+    notes = check_recording(recording, robot, names, starts) if check else ()
     scales = np.array([one.scale for one in chosen])
     limits = np.array([one.bounds for one in chosen], dtype=np.float64)
     first = np.array([one.start for one in chosen])
     levels = _Levels(recording, noise or Noise())
-    short, shooting = (Shooting(robot, recording, names, known, share * window, dynamics) for share in (_SHORT, 1.0))
-    rough = fit(short, short.first_guess(), first, scales, limits, levels.at_first, levels.update, np.inf, report)
+    short, shooting = (Shooting(robot, recording, names, starts, share * window, dynamics) for share in (_SHORT, 1.0))
+    rough = fit(short, short.first_guess(first), first, scales, limits, levels.at_first, levels.update, np.inf, report)
     nearer = short.starts_on(shooting, rough.point.path)
     found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, report=report)
     untold = found.told.untold  # what is not told goes back to where it started, which the recording does not notice
@@ -122,9 +137,10 @@ def identify(
         agreements=agreements,
         untold=tuple(_untold_words(found.told.untold, chosen)),
         warnings=tuple(_warning_words(found, chosen, agreements, half_widths)),
+        notes=(*notes, *_entangled_words(correlations, chosen)),
         shooting=shooting,
-        before=shooting.at_samples(shooting.predict(found.point.starts, first)),
-        after=shooting.at_samples(shooting.predict(found.point.starts, values)),
+        before=shooting.at_samples(shooting.predict(found.point.starts, first), first),
+        after=shooting.at_samples(shooting.predict(found.point.starts, values), values),
         steps=rough.steps + found.steps,
     )
 
@@ -260,6 +276,21 @@ def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
     return sentences
 
 
+def _entangled_words(correlations: Array, chosen: Sequence[Unknown]) -> list[str]:
+    """Pairs that the recording hardly tells apart, each with its correlation."""
+    sentences = []
+    for i, one in enumerate(chosen):
+        for j, other in enumerate(chosen[:i]):
+            if abs(correlations[i, j]) > _ENTANGLED:
+                wider = (1.0 - min(correlations[i, j] ** 2, 1.0 - 1e-12)) ** -0.5
+                sentences.append(
+                    f"{other.name} and {one.name} are hardly told apart; with a correlation of "
+                    f"{correlations[i, j]:+.3f}, knowing either would make the other's interval {wider:.0f} times "
+                    "narrower, at least."
+                )
+    return sentences
+
+
 def _warning_words(
     found: Fit, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
 ) -> list[str]:
@@ -283,6 +314,6 @@ def _warning_words(
             "disagree, but may still be too narrow."
         )
     for one, value, half in zip(chosen, found.point.values, half_widths, strict=True):
-        if value + 2.0 * half < 0.0 and one.name not in SIGNED:
+        if value + 2.0 * half < 0.0 and kind_of(one.name) not in SIGNED:
             sentences.append(f"{one.name} comes out negative, which no robot has: the model misses something else.")
     return sentences

@@ -6,6 +6,7 @@ A file has one row a sample and a header that names each column with its unit. I
     x [m], y [m], heading [rad]        pose of C in the world; the heading may wrap or not
     vx [m/s], vy [m/s], yaw_rate [rad/s]      twist at C, in B; all three or none
     steering_1 [rad] … steering_N [rad]       angle of each rolling direction in B, as encoders show it
+    rolling_1 [rad] … rolling_N [rad]         angle each wheel has rolled, forward positive, never wrapped; all or none
     torque_roll_1 [N m], torque_steer_1 [N m], …      at the joints, held from this sample to the next
     motor_roll_1 [N m], motor_steer_1 [N m], …        instead of these: at the motors, which `gear` couples
 
@@ -21,6 +22,7 @@ import numpy as np
 from pydantic import NonNegativeFloat
 
 from caster_gym.analysis.recording_table import FEWEST_ROWS, POSE, TWIST, Array, read_measured
+from caster_gym.analysis.rolling import rolled_along
 from caster_gym.configuration import Frozen
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.time_step import longest_time_step, substeps_for
@@ -36,10 +38,11 @@ class Noise(Frozen):
     velocity: NonNegativeFloat | None = None  # [m/s]
     yaw_rate: NonNegativeFloat | None = None  # [rad/s]
     steering: NonNegativeFloat | None = None  # [rad]
+    rolling: NonNegativeFloat | None = None  # [rad]
 
 
 KINDS = tuple(Noise.model_fields)
-KIND_UNITS = dict(zip(KINDS, ("m", "rad", "m/s", "rad/s", "rad"), strict=True))
+KIND_UNITS = dict(zip(KINDS, ("m", "rad", "m/s", "rad/s", "rad", "rad"), strict=True))
 _KIND_OF_BODY: tuple[str, ...] = ("position", "position", "heading", "velocity", "velocity", "yaw_rate")
 
 
@@ -52,23 +55,25 @@ class Recording:
     steering: Array  # (K, N) [rad]
     torque: Array  # (K, 2 N) at the joints roll_1, steer_1, …, held until the next sample [N m]
     twist: Array | None = None  # (K, 3) in B [m/s, m/s, rad/s]
+    rolling: Array | None = None  # (K, N) angles that the wheels have rolled [rad]
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kind of each component of a state x, y, β, vx, vy, ω, δ_1, …"""
-        return (*_KIND_OF_BODY, *["steering"] * self.steering.shape[1])
+        """Kind of each component of a state x, y, β, vx, vy, ω, δ_1, …, and of θ_1, … if those were measured."""
+        n = self.steering.shape[1]
+        return (*_KIND_OF_BODY, *["steering"] * n, *["rolling"] * (0 if self.rolling is None else n))
 
     @property
     def observed(self) -> list[int]:
         """Components of the state that were measured."""
         twist = [] if self.twist is None else [3, 4, 5]
-        return [0, 1, 2, *twist, *range(6, 6 + self.steering.shape[1])]
+        return [0, 1, 2, *twist, *range(6, len(self.kinds))]
 
     @property
     def measured(self) -> Array:
         """The measured components (K, observed)."""
-        parts = [self.pose, self.steering] if self.twist is None else [self.pose, self.twist, self.steering]
-        return np.concatenate(parts, axis=1)
+        parts = [self.pose, self.twist, self.steering, self.rolling]
+        return np.concatenate([part for part in parts if part is not None], axis=1)
 
     def without_twist(self) -> "Recording":
         """The same recording as a robot makes it that measures no velocities."""
@@ -77,12 +82,14 @@ class Recording:
     def noisy(self, noise: Noise, rng: np.random.Generator) -> "Recording":
         """The same recording with errors added to all that is measured; torques stay."""
         levels = np.array([getattr(noise, kind) or 0.0 for kind in self.kinds])
-        pose, twist, steering = np.split(levels * rng.standard_normal((len(self.pose), len(levels))), [3, 6], axis=1)
+        errors = levels * rng.standard_normal((len(self.pose), len(levels)))
+        pose, twist, steering, rolling = np.split(errors, [3, 6, 6 + self.steering.shape[1]], axis=1)
         return replace(
             self,
             pose=self.pose + pose,
             steering=self.steering + steering,
             twist=None if self.twist is None else self.twist + twist,
+            rolling=None if self.rolling is None else self.rolling + rolling,
         )
 
 
@@ -93,12 +100,13 @@ def record(
     seed: int = 0,
     share: float = 0.5,
     dynamics: Dynamics = "exact",
+    with_rolling: bool = False,
 ) -> Recording:
     """A recording, without noise, of a robot that its driven joints push along all its three degrees of freedom.
 
     Each component of the force at C is a sum of sines of random phases less a drag on the twist, which keeps the robot
     slow; the joints share it with the least sum of squared shares of their greatest torques, within these.
-    share [-]: of the greatest force that all rolling motors have together.
+    share [-]: of the greatest force that all rolling motors have together. with_rolling: the wheels' angles too.
     """
     if not 0.0 < time_step <= seconds / FEWEST_ROWS:
         raise ValueError(
@@ -114,7 +122,7 @@ def record(
     frequencies = _FREQUENCIES[:, None] * rng.uniform(0.8, 1.25, phases.shape)
     count, substeps = round(seconds / time_step) + 1, substeps_of(robot, time_step)
     state = np.concatenate([np.zeros(6), rng.uniform(-np.pi, np.pi, robot.caster_count)])
-    states, torques = [], []
+    states, torques, rolled = [], [], [np.zeros(robot.caster_count)]
     for k in range(count):
         waves = np.sin(2.0 * np.pi * frequencies * k * time_step + phases).sum(axis=0) / len(_FREQUENCIES) ** 0.5
         wrenches = limits[:, None] * model.jacobian(state[6:], robot.driven)
@@ -123,9 +131,12 @@ def record(
         torque[driven] = limits * np.clip(shares, -1.0, 1.0)
         states.append(state)
         torques.append(torque)
-        state = model.simulate(state, torque, time_step / substeps, substeps)[-1]
+        path = model.simulate(state, torque, time_step / substeps, substeps)
+        rolled.append(rolled[-1] + rolled_along(model, path, torque, time_step / substeps)[-1])
+        state = path[-1]
     moved = np.array(states)
-    return Recording(time_step, moved[:, :3], moved[:, 6:], np.array(torques), moved[:, 3:6])
+    rolling = np.array(rolled[:count]) if with_rolling else None
+    return Recording(time_step, moved[:, :3], moved[:, 6:], np.array(torques), moved[:, 3:6], rolling)
 
 
 _FREQUENCIES = np.array([0.2, 0.5, 1.1, 2.3])  # [Hz]
@@ -152,6 +163,7 @@ def write_recording(path: str | Path, recording: Recording) -> None:
     casters = range(1, recording.steering.shape[1] + 1)
     names = ["time", *POSE, *(TWIST if recording.twist is not None else ())]
     names += [f"steering_{i}" for i in casters]
+    names += [f"rolling_{i}" for i in casters] if recording.rolling is not None else []
     names += [f"torque_{kind}_{i}" for i in casters for kind in ("roll", "steer")]
     time = recording.time_step * np.arange(len(recording.pose))
     rows = np.column_stack([time, recording.measured, recording.torque])
@@ -164,4 +176,4 @@ def write_recording(path: str | Path, recording: Recording) -> None:
 def read_recording(path: str | Path, robot: Robot) -> Recording:
     """A recording of a robot from a file. Raises ValueError that names column, line and value of what is wrong."""
     found = read_measured(Path(path).expanduser(), robot)
-    return Recording(found.time_step, found.pose, found.steering, found.torque, found.twist)
+    return Recording(found.time_step, found.pose, found.steering, found.torque, found.twist, found.rolling)

@@ -7,18 +7,21 @@ longer than a window lasts, even where casters flip. All windows are one batch.
     values     of the unknowns, in their units                                           (P,)
     path       states predicted, after each of k simulator's steps between samples       (W, 1 + k (S − 1), 6 + N)
 
+Where the recording has the wheels' angles, these are N more components of a state, and their rates are integrated.
 The derivatives are those of the simulator's steps, by forward differentiation with Torch, chained along each window.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from caster_gym.analysis.acting import acting_torque, acts, shown_errors
 from caster_gym.analysis.recording import Recording, substeps_of
-from caster_gym.analysis.unknowns import parameters_with
+from caster_gym.analysis.rolling import rolled_along
+from caster_gym.analysis.unknowns import PARAMETERS, kind_of, parameters_with
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.torch_model import TorchModel
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters
@@ -27,6 +30,7 @@ from caster_gym.robot import Robot
 Array = NDArray[np.float64]
 
 _SMOOTHING = 7  # samples over which velocities are first guessed from poses
+_ASIDE = 1e-6  # [-] of a value, or in its unit, by which it is changed for a difference
 _TOGETHER = 30_000  # numbers in one tensor: more, and Torch would wake its threads, which wait for busy neighbours
 
 
@@ -55,43 +59,50 @@ class Shooting:
         self._substeps = substeps_of(robot, recording.time_step)
         self._step = recording.time_step / self._substeps
         self.measured = self._cut(recording.measured)  # (W, S, observed)
-        held = self._cut(recording.torque)[:, :-1]
-        self._torque = np.repeat(held, self._substeps, axis=1)  # (W, k (S − 1), 2 N)
+        self._state = 6 + robot.caster_count
+        self._rolls = recording.rolling is not None
+        self._plain = self._torque({}) if not acts({**known, **dict.fromkeys(names, 0.0)}) else None
         self._angle = np.isin(np.array(recording.kinds)[self.observed], ("heading", "steering"))
 
-    def first_guess(self) -> Array:
+    def first_guess(self, values: Array) -> Array:
         """Starts as measured; where velocities were not, from a parabola through the poses nearby."""
-        recording = self.recording
-        twist = _twist_from(recording) if recording.twist is None else recording.twist
-        return self._cut(np.concatenate([recording.pose, twist, recording.steering], axis=1))[:, 0]
+        recording, errors = self.recording, self._shown_errors(values)
+        twist = _twist_from(recording) + errors[3:6] if recording.twist is None else recording.twist
+        parts = [recording.pose, twist, recording.steering, recording.rolling]
+        return self._cut(np.concatenate([part for part in parts if part is not None], axis=1) - errors)[:, 0]
 
     def predict(self, starts: Array, values: Array) -> Array:
         """The predicted path; not finite where the simulation ran away."""
         model = Model(self.robot, parameters=self._parameters(values))
-        torque = self._torque.swapaxes(0, 1)
+        torque = self._torque(self._named(values)).swapaxes(0, 1)
         with np.errstate(all="ignore"):
-            return model.simulate(starts, torque, self._step, len(torque), checked=True).swapaxes(0, 1)
+            path = model.simulate(starts[:, : self._state], torque, self._step, len(torque), checked=True)
+        if self._rolls:
+            wild = not np.isfinite(path).all()
+            rolled = np.full_like(path[..., 6:], np.nan) if wild else rolled_along(model, path, torque, self._step)
+            path = np.concatenate([path, starts[:, self._state :] + rolled], axis=-1)
+        return path.swapaxes(0, 1)
 
     def starts_on(self, coarser: "Shooting", path: Array) -> Array:
         """Starts of another cut of the recording, from a path of this one."""
         samples = path[:, :: self._substeps].reshape(-1, path.shape[-1])
         return samples[: coarser.count * coarser.length : coarser.length]
 
-    def at_samples(self, path: Array) -> Array:
-        """What a path says of the measured components, (W, S, observed)."""
-        return path[:, :: self._substeps, self.observed]
+    def at_samples(self, path: Array, values: Array) -> Array:
+        """What sensors show of a path, of the measured components (W, S, observed)."""
+        return path[:, :: self._substeps, self.observed] + self._shown_errors(values)[self.observed]
 
-    def errors(self, path: Array) -> Array:
+    def errors(self, path: Array, values: Array) -> Array:
         """Predicted minus measured (W, S, observed), angles within ± π."""
-        errors = self.at_samples(path) - self.measured
+        errors = self.at_samples(path, values) - self.measured
         with np.errstate(invalid="ignore"):
             turned = np.mod(errors + np.pi, 2.0 * np.pi) - np.pi
         return np.where(self._angle, turned, errors)
 
     def derivatives(self, path: Array, values: Array) -> tuple[Array, Array]:
         """Derivatives of what is observed with respect to starts (W, S, observed, 6 + N) and values (…, P)."""
-        slopes = self._step_derivatives(path[:, :-1], values)
-        width, count = path.shape[-1], len(values)
+        slopes = self._step_derivatives(path[:, :-1, : self._state], values)
+        width, count = self._state, len(values)
         here = np.zeros((self.count, width, width + count))
         here[..., :width] = np.eye(width)
         chained = [here]
@@ -99,41 +110,101 @@ class Shooting:
             here = slopes[:, k, :, :width] @ here
             here[..., width:] += slopes[:, k, :, width:]
             chained.append(here)
-        observed = np.stack(chained[:: self._substeps], axis=1)[:, :, self.observed]
-        return observed[..., :width], observed[..., width:]
+        whole = np.stack(chained, axis=1)
+        if self._rolls:
+            whole = self._with_rolling(path, values, whole)
+            width = whole.shape[-1] - count
+        observed = whole[:, :: self._substeps][:, :, self.observed]
+        errors = self._slopes_of(lambda moved: self._shown_errors(moved)[self.observed], values)
+        return observed[..., :width], observed[..., width:] + errors
+
+    def _with_rolling(self, path: Array, values: Array, whole: Array) -> Array:
+        """Derivatives of states and of the wheels' angles, from those of states (W, …, 6 + N, 6 + N + P)."""
+        state, n = self._state, self.robot.caster_count
+        twist, steering = path[..., 3:6], path[..., 6:state]
+
+        def rates(steering: Array, values: Array) -> Array:
+            return Model(self.robot, parameters=self._parameters(values)).rates(steering, twist)[1]
+
+        model = Model(self.robot, parameters=self._parameters(values))
+        turned = (rates(steering + _ASIDE, values) - rates(steering - _ASIDE, values)) / (2.0 * _ASIDE)
+        slopes = model.jacobian(steering)[..., ::2, :] @ whole[..., 3:6, :] + turned[..., None] * whole[..., 6:, :]
+        slopes[..., state:] += self._slopes_of(lambda moved: rates(steering, moved), values)
+        steps = np.cumsum(0.5 * self._step * (slopes[:, 1:] + slopes[:, :-1]), axis=1)
+        grown = np.zeros((*whole.shape[:2], state + n, whole.shape[-1] + n))
+        grown[..., :state, :state], grown[..., :state, state + n :] = whole[..., :state], whole[..., state:]
+        grown[:, 1:, state:, :state], grown[:, 1:, state:, state + n :] = steps[..., :state], steps[..., state:]
+        grown[..., state:, state : state + n] = np.eye(n)
+        return grown
+
+    def _slopes_of(self, function: Callable[[Array], Array], values: Array) -> Array:
+        """Derivatives (…, P) of a function of the values, by differences."""
+        slopes = []
+        for i, (name, value) in enumerate(zip(self.names, values, strict=True)):
+            aside = _ASIDE * (abs(value) or 1.0)
+            low, high = values.copy(), values.copy()
+            low[i], high[i] = value - aside, value + aside
+            if name == "motor_lag":
+                low[i] = max(low[i], 0.0)
+            slopes.append((function(high) - function(low)) / (high[i] - low[i]))
+        return np.stack(slopes, axis=-1)
 
     def _step_derivatives(self, states: Array, values: Array) -> Array:
         """Derivatives (W, k (S − 1), 6 + N, 6 + N + P) of each step's end with respect to its start and the values."""
         width, count = states.shape[-1], len(values)
         flat = torch.as_tensor(states.reshape(-1, width))
-        torques = torch.as_tensor(self._torque.reshape(len(flat), -1))
+        joints = 2 * self.robot.caster_count
+        torques = torch.as_tensor(self._torque(self._named(values)).reshape(-1, joints))
+        pushed = torch.zeros((len(flat), joints, count), dtype=torch.float64)
+        if self._plain is None:
+            moved = self._slopes_of(lambda values: self._torque(self._named(values)), values)
+            pushed = torch.as_tensor(moved.reshape(-1, joints, count))
         seeds = torch.eye(width + count, dtype=torch.float64)
         lanes = max(1, _TOGETHER // len(seeds))
         parts = [
-            self._tangents(state, torque, torch.as_tensor(values), seeds)
-            for state, torque in zip(torch.split(flat, lanes), torch.split(torques, lanes), strict=True)
+            self._tangents(state, torque, push, torch.as_tensor(values), seeds)
+            for state, torque, push in zip(*(torch.split(one, lanes) for one in (flat, torques, pushed)), strict=True)
         ]
         slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy()
         return slopes.reshape(*states.shape, width + count)
 
     def _tangents(
-        self, state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
+        self, state: torch.Tensor, torque: torch.Tensor, pushed: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
     ) -> torch.Tensor:
-        """How one step's ends (L, 6 + N) change along each of some directions of state and values, one a seed."""
+        """How one step's ends (L, 6 + N) change along each of some directions of state and values, one a seed.
 
-        def end(state: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
+        pushed (L, 2 N, P): how the torques change with the values.
+        """
+
+        def end(state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
             model = TorchModel(self.robot, parameters=self._parameters(values))
             both: Any = model.simulate(cast(Any, state), cast(Any, torque), self._step, 1)
             return cast(torch.Tensor, both[1])
 
         def along(seed: torch.Tensor) -> torch.Tensor:
-            tangents = (seed[: state.shape[1]].expand_as(state), seed[state.shape[1] :])
-            return cast(torch.Tensor, torch.func.jvp(end, (state, values), tangents)[1])
+            of_state, of_values = seed[: state.shape[1]].expand_as(state), seed[state.shape[1] :]
+            tangents = (of_state, pushed @ of_values, of_values)
+            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, values), tangents)[1])
 
         return torch.vmap(along)(seeds)
 
+    def _torque(self, values: Mapping[str, float]) -> Array:
+        """Torques (W, k (S − 1), 2 N) that act over each step."""
+        if getattr(self, "_plain", None) is not None:
+            return cast(Array, self._plain)
+        torque = acting_torque(self.recording, self.robot, values, self._substeps)
+        rows = self.length * self._substeps
+        return torque[: self.count * rows].reshape(self.count, rows, -1)[:, : rows - self._substeps]
+
+    def _shown_errors(self, values: Array) -> Array:
+        return shown_errors(self.robot, self._named(values), len(self.recording.kinds))
+
+    def _named(self, values: Array) -> dict[str, float]:
+        return {**self.known, **{name: float(values[i]) for i, name in enumerate(self.names)}}
+
     def _parameters(self, values: Array | torch.Tensor) -> RobotParameters:
-        replaced = {**self.known, **{name: values[i] for i, name in enumerate(self.names)}}
+        named = {**self.known, **{name: values[i] for i, name in enumerate(self.names)}}
+        replaced = {name: value for name, value in named.items() if kind_of(name) in PARAMETERS}
         return parameters_with(self.robot, replaced, self.dynamics)
 
     def _cut(self, rows: Array) -> Array:

@@ -107,7 +107,7 @@ NoiseUpdate: TypeAlias = Callable[[Normal, Told, Array], Array]
 def point_at(shooting: Shooting, starts: Array, values: Array) -> Point:
     """The prediction from initial states and values."""
     path = shooting.predict(starts, values)
-    return Point(starts, values, path, shooting.errors(path))
+    return Point(starts, values, path, shooting.errors(path, values))
 
 
 def fit(

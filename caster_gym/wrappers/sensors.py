@@ -47,26 +47,34 @@ class SensorNoise(Feature):
 
 
 class SteeringOffset(Feature):
-    """Steering encoders that show every angle turned by a constant, drawn caster by caster."""
+    """Steering encoders that show every angle turned by a constant: known zeros, and what is drawn for each caster."""
 
     kind: Literal["steering_offset"] = "steering_offset"
     angle: Range = (-0.02, 0.02)  # [rad] shown minus true angle
+    zeros: tuple[float, ...] = ()  # [rad] of each caster, to which `angle` is added, such as `identify` finds them
 
     def runtime(self, place: Place) -> Runtime:
-        """Encoders of every robot."""
+        """Encoders of every robot. Raises ValueError for another number of zeros than the robot has casters."""
+        casters = place.engine.robot.caster_count
+        if self.zeros and len(self.zeros) != casters:
+            raise ValueError(
+                f"steering_offset needs as many zeros as robot {place.engine.robot.name!r} has casters, {casters}, or "
+                f"none, got {len(self.zeros)}"
+            )
         return _SteeringOffset(self, place)
 
 
 class _SteeringOffset(Runtime):
     def __init__(self, feature: SteeringOffset, place: Place) -> None:
         self._range, self._place = feature.angle, place
+        self._zeros = np.array(feature.zeros or (0.0,))
         self._directions = place.part("directions").place
         casters = place.engine.robot.caster_count
         self._casters = np.arange(casters)
         self._cos, self._sin = np.ones((place.count, casters)), np.zeros((place.count, casters))
 
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
-        angles = between(self._range, uniforms(self._place.seeds[robots], self._casters))
+        angles = self._zeros + between(self._range, uniforms(self._place.seeds[robots], self._casters))
         self._cos[robots], self._sin[robots] = np.cos(angles), np.sin(angles)
 
     def observe(self, observations: Observations, robots: Robots) -> Observations:
