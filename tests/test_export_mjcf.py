@@ -1,5 +1,8 @@
 """A MuJoCo model has the robot's masses, joints, gears and limits; test_mujoco_peer.py shows that it moves alike."""
 
+import warnings
+from xml.etree import ElementTree
+
 import mujoco
 import numpy as np
 import pytest
@@ -35,19 +38,96 @@ def test_motors_are_the_driven_ones_with_their_limits():
     assert_allclose(model.actuator_ctrlrange[:, 0], [-1.58, -9.93, -9.93])
 
 
-def test_power_passes_the_gears():
+def geared(gear, name="chung2008"):
+    """A robot whose casters all have a gear, and friction of each kind."""
+    robot = load_robot(name)
+    motor = robot.casters[0].roll.model_copy(update={"armature": 1e-3, "viscous": 2e-3, "coulomb": 3e-3})
+    update = {"gear": gear, "roll": motor, "steer": motor, "scrub": 4e-3}
+    return robot.model_copy(update={"casters": tuple(caster.model_copy(update=update) for caster in robot.casters)})
+
+
+GEARS = {
+    "diagonal": ((3.0, 0.0), (0.0, -2.0)),
+    "each motor on the other's joint": ((0.0, 2.0), (1.0, 0.0)),
+    "one motor on both joints": ((1.0, -0.4), (0.0, 1.0)),
+    "both on both": ((1.0, 0.5), (-0.5, 1.0)),
+}
+
+
+@pytest.mark.parametrize("gear", GEARS.values(), ids=GEARS)
+def test_power_passes_the_gears(gear):
     """Motor torques times motor speeds = generalised forces times velocities, whatever the gear."""
-    robot = load_robot("tidybot2")
+    robot = geared(gear)
     model = compiled(robot)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(0)
     data.qvel[:] = rng.normal(size=model.nv)
-    data.ctrl[:] = rng.uniform(-1.0, 1.0, model.nu)
+    data.ctrl[:] = rng.uniform(-0.1, 0.1, model.nu)
     mujoco.mj_forward(model, data)
     index = {model.joint(i).name: int(model.jnt_dofadr[i]) for i in range(model.njnt)}
     rates = np.array([data.qvel[index[joint]] for joint in robot.joints]).reshape(-1, 2)
     speeds = np.concatenate([np.array(c.gear) @ pair for c, pair in zip(robot.casters, rates, strict=True)])
     assert_allclose(data.ctrl @ speeds, data.qfrc_actuator @ data.qvel, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("gear", "on_tendons"), list(zip(GEARS.values(), (0, 0, 3, 6), strict=True)), ids=GEARS)
+def test_only_motors_of_both_joints_act_on_tendons(gear, on_tendons):
+    """Drake drops motors on tendons, and the rotor inertias with them."""
+    model = compiled(geared(gear))
+    assert model.nu == 6
+    assert (model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON).sum() == on_tendons
+
+
+def test_a_robot_without_scrub_and_coupled_joints_has_no_tendons():
+    assert "tendon" not in mjcf(load_robot("chung2008"), STEP)
+    scrubbed = compiled(geared(GEARS["diagonal"]))
+    assert_allclose(scrubbed.tendon_damping.reshape(3, -1)[:, 0], 4e-3)
+
+
+def sunk(friction, **option):
+    """How far [m] wheels sink after 1 s in a scene of somebody else's that the model was attached to."""
+    robot = load_robot("chung2008")
+    scene = mujoco.MjSpec()
+    scene.option.timestep = STEP
+    for name, value in option.items():
+        setattr(scene.option, name, value)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that the scene keeps its own options
+        scene.attach(
+            mujoco.MjSpec.from_string(mjcf(robot, STEP, friction)), frame=scene.worldbody.add_frame(), prefix="a_"
+        )
+        model = scene.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 500)
+    return robot.casters[0].radius - data.body("a_wheel_1").xpos[2]
+
+
+def test_what_the_comment_says_of_scenes_is_true():
+    """The pyramidal cone at friction 5 lets wheels of 25 mm sink 3.7 mm; both ways out that the comment names help."""
+    elliptic = {"cone": mujoco.mjtCone.mjCONE_ELLIPTIC, "impratio": 100.0}
+    whole = sunk(5.0, **elliptic)
+    assert whole == pytest.approx(2.5e-5, rel=0.02)
+    assert sunk(5.0) > 3e-3
+    assert sunk(1.0) == pytest.approx(whole, rel=0.01)
+    told = mjcf(load_robot("chung2008"), STEP)
+    assert 'cone="elliptic" and impratio="100"' in told and "friction 1" in told and "0.002 s" in told
+
+
+def test_the_drawn_platform_is_a_closed_surface_seen_from_outside():
+    """Every edge belongs to two faces that run along it in opposite ways, and the volume is area times height."""
+    robot = load_robot("tidybot2")
+    model = compiled(robot)
+    text = ElementTree.fromstring(mjcf(robot, STEP)).find("asset/mesh")
+    faces = np.array(text.get("face").split(), dtype=int).reshape(-1, 3)
+    vertices = np.array(text.get("vertex").split(), dtype=float).reshape(-1, 3)
+    edges = [(int(face[i]), int(face[(i + 1) % 3])) for face in faces for i in range(3)]
+    assert len(set(edges)) == len(edges)
+    assert {(b, a) for a, b in edges} == set(edges)
+    volume = np.linalg.det(vertices[faces]).sum() / 6.0
+    (x, y), height = np.array(robot.platform.footprint.polygon).T, np.ptp(vertices[:, 2])
+    area = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    assert volume == pytest.approx(area * height, rel=1e-9)
+    assert model.mesh("platform").id == 0
 
 
 def test_the_platform_rests_on_its_wheels():

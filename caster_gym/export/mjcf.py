@@ -6,8 +6,9 @@ rolling without slip, the equations of caster_gym.
 
 The platform slides in x, y and z and turns about the vertical: it cannot tip, the slide in z lets its weight press the
 wheels on the floor. Rotor inertias, damping and dry friction sit at the joints, as in the robot's file. MuJoCo's dry
-friction holds a joint that caster_gym lets creep: a comment in the model says how fast. A motor acts on a tendon whose
-length is what the motor has turned, by the gear of its caster.
+friction holds a joint that caster_gym lets creep: a comment in the model says how fast. A motor that turns one joint
+alone acts on that joint; a motor that the gear of its caster couples to both joints acts on a tendon whose length is
+what the motor has turned. docs/export.md tells which of this other readers of MJCF take.
 """
 
 import math
@@ -21,6 +22,7 @@ FRICTION = 5.0  # [-] more than any floor has, so that no wheel breaks away
 FRICTION_STIFFNESS = 100.0  # [-] of friction over that of the normal force: less creep under load
 CONTACT_STEPS = 2.0  # time constant of the contact in time steps, the stiffest that MuJoCo accepts
 DRAWN_HEIGHT = 0.05  # [m] of the platform, which has none in the robot's file
+_KINDS = ("roll", "steer")  # of the joints and motors of a caster
 _SEEN = 'contype="0" conaffinity="0" mass="0"'  # drawn only
 
 
@@ -37,15 +39,13 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
     for number, caster in enumerate(robot.casters, start=1):
         _check_solid(number, caster)
     casters = "".join(_caster_body(number, caster) for number, caster in enumerate(robot.casters, start=1))
-    tendons = "".join(_tendons(number, caster) for number, caster in enumerate(robot.casters, start=1))
-    all_motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-    motors = "".join(
-        _motor(joint, motor) for joint, motor in zip(robot.joints, all_motors, strict=True) if joint in robot.driven
-    )
+    tendons = "".join(_tendons(number, caster, robot.driven) for number, caster in enumerate(robot.casters, start=1))
+    motors = "".join(_motors(number, caster, robot.driven) for number, caster in enumerate(robot.casters, start=1))
     p = robot.platform
     top = max(caster.radius for caster in robot.casters) + DRAWN_HEIGHT
     asset, outline = _outline(p.footprint, top)
-    return f"""<mujoco model={quoteattr(robot.name)}>{_note_on_dry_friction(robot)}
+    notes = _what_belongs_together(time_step, friction) + _note_on_dry_friction(robot)
+    return f"""<mujoco model={quoteattr(robot.name)}>{notes}
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{_numbers(time_step)}" integrator="implicitfast" cone="elliptic"
           impratio="{_numbers(FRICTION_STIFFNESS)}"
@@ -64,13 +64,27 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
       {_inertial(p.mass, (*p.com, 0.0), (p.inertia, p.inertia, p.inertia))}
       {outline}{casters}
     </body>
-  </worldbody>
+  </worldbody>{
+        tendons
+        and f'''
   <tendon>{tendons}
-  </tendon>
+  </tendon>'''
+    }
   <actuator>{motors}
   </actuator>
 </mujoco>
 """
+
+
+def _what_belongs_together(time_step: float, friction: float) -> str:
+    """A comment for whoever puts the model into a scene or changes a number of it."""
+    return f"""
+  <!-- What belongs together:
+       - friction {friction:g} needs the elliptic cone. A scene that this model is attached to keeps its own cone, by
+         default the pyramidal one, into which wheels sink the deeper the greater the friction; at friction 1 both
+         cones carry alike. Give the scene cone="elliptic" and impratio="{FRICTION_STIFFNESS:g}", or write this model
+         with friction 1.
+       - solref is {CONTACT_STEPS:g} time steps of {time_step:g} s. Write the model anew for another timestep. -->"""
 
 
 def _note_on_dry_friction(robot: Robot) -> str:
@@ -93,7 +107,12 @@ def _outline(footprint: Footprint, top: float) -> tuple[str, str]:
     corners = footprint.polygon or ()
     low, high = top - 0.5 * DRAWN_HEIGHT, top + 0.5 * DRAWN_HEIGHT
     vertices = " ".join(_numbers(x, y, z) for z in (low, high) for x, y in corners)
-    asset = f'\n  <asset><mesh name="platform" inertia="shell" vertex="{vertices}"/></asset>'
+    n = len(corners)
+    around = [(i, (i + 1) % n) for i in range(n)]
+    triangles = [(0, i + 1, i) for i in range(1, n - 1)] + [(n, n + i, n + i + 1) for i in range(1, n - 1)]
+    triangles += [corner for a, b in around for corner in ((a, b, n + b), (a, n + b, n + a))]
+    faces = " ".join(str(corner) for triangle in triangles for corner in triangle)  # seen from outside: to the left
+    asset = f'\n  <asset><mesh name="platform" inertia="shell" vertex="{vertices}" face="{faces}"/></asset>'
     return asset, f'<geom type="mesh" mesh="platform" {look}/>'
 
 
@@ -125,20 +144,36 @@ def _inertial(mass: float, position: Sequence[float], diagonal: Sequence[float])
     return f'<inertial mass="{_numbers(mass)}" pos="{_numbers(*position)}" diaginertia="{_numbers(*diagonal)}"/>'
 
 
-def _tendons(number: int, caster: Caster) -> str:
-    """What each motor has turned, and the wheel's yaw over ground, the sum of the platform's yaw and the steering."""
+def _tendons(number: int, caster: Caster, driven: Sequence[str]) -> str:
+    """What each motor of both joints has turned; with scrub also the wheel's yaw over ground, platform and steering."""
     turned = "".join(
         f'\n    <fixed name="motor_{kind}_{number}"><joint joint="roll_{number}" coef="{_numbers(roll)}"/>'
         f'<joint joint="steer_{number}" coef="{_numbers(steer)}"/></fixed>'
-        for kind, (roll, steer) in zip(("roll", "steer"), caster.gear, strict=True)
+        for kind, (roll, steer) in zip(_KINDS, caster.gear, strict=True)
+        if roll and steer and f"{kind}_{number}" in driven
     )
+    if not caster.scrub:
+        return turned
     joints = f'<joint joint="yaw" coef="1"/><joint joint="steer_{number}" coef="1"/>'
     return f'{turned}\n    <fixed name="yaw_{number}" damping="{_numbers(caster.scrub)}">{joints}</fixed>'
 
 
-def _motor(joint: str, motor: Motor) -> str:
-    span = f'ctrllimited="true" ctrlrange="{_numbers(-motor.max_torque, motor.max_torque)}"'
-    return f'\n    <motor name="{joint}" tendon="motor_{joint}" {span}/>'
+def _motors(number: int, caster: Caster, driven: Sequence[str]) -> str:
+    """The driven motors of a caster, each on the joint that it turns or, if it turns both, on its tendon."""
+    motors = ""
+    for kind, motor, ratios in zip(_KINDS, (caster.roll, caster.steer), caster.gear, strict=True):
+        name, span = f"{kind}_{number}", _numbers(-motor.max_torque, motor.max_torque)
+        if name not in driven:
+            continue
+        turned = [(joint, ratio) for joint, ratio in zip(_KINDS, ratios, strict=True) if ratio]
+        if len(turned) == 1:
+            (joint, ratio), *_ = turned
+            gear = "" if ratio == 1.0 else f' gear="{_numbers(ratio)}"'
+            place = f'joint="{joint}_{number}"{gear}'
+        else:
+            place = f'tendon="motor_{name}"'
+        motors += f'\n    <motor name="{name}" {place} ctrllimited="true" ctrlrange="{span}"/>'
+    return motors
 
 
 def _check_solid(number: int, caster: Caster) -> None:
