@@ -1,11 +1,12 @@
 """What limits each engine, told with the numbers that were measured."""
 
+import math
 from typing import Any
 
 from caster_gym import Robot
 from caster_gym.mechanics.integration import rk4_step, unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
-from caster_gym.mechanics.scalars import pairs
+from caster_gym.mechanics.scalars import pairs, register
 from scripts.mujoco_peer import paragraph
 from scripts.speed_accuracy import Accuracy
 from scripts.speed_growth import line
@@ -32,6 +33,7 @@ def _counting(name: str) -> Any:
 
 for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "neg", "abs"):
     setattr(Counted, f"__{_name}__", _counting(f"__{_name}__"))
+register(Counted, lambda condition, yes, no: yes if condition else no, math.sqrt, bool)  # neither is counted
 
 
 def operations_of_a_step(robot: Robot) -> int:
