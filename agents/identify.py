@@ -86,19 +86,22 @@ def identify(
     with staged(out, overwrite) as folder:
         from caster_gym.analysis.identification import identify as estimate  # late: Torch takes seconds
 
-        found = estimate(
-            robot,
-            recorded,
-            settings.unknowns,
-            settings.start,
-            settings.bounds,
-            settings.noise,
-            settings.window,
-            settings.confidence,
-            settings.dynamics,
-            report,
-            settings.check,
-        )
+        from .threads import DEFAULT, limited_to
+
+        with limited_to(DEFAULT):
+            found = estimate(
+                robot,
+                recorded,
+                settings.unknowns,
+                settings.start,
+                settings.bounds,
+                settings.noise,
+                settings.window,
+                settings.confidence,
+                settings.dynamics,
+                report,
+                settings.check,
+            )
         write_identification(found, recording, settings, folder)
     return in_words(found)
 

@@ -308,7 +308,7 @@ def test_commands_try_their_folder_before_they_compute(call, tmp_path, monkeypat
         "caster_gym.agents.benchmark.run_benchmark",
         "caster_gym.agents.reproduction._build",
         "caster_gym.agents.design.make_design",
-        "caster_gym.agents.identify.estimate",
+        "caster_gym.analysis.identification.identify",
     ):
         monkeypatch.setattr(place, lambda *_, **__: pytest.fail("computed before the folder was tried"))
     assert_refused(call(*command, "--out", out), "choose another --out")

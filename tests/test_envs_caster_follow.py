@@ -263,7 +263,7 @@ def pillar(x, y, radius=0.1):
             {"path": {"shape": "random_paths", "count": 3, "seed": 1, "reversing": 1.0}},
             r"path 'random_paths.*' makes no course: it turns back on the spot at s = .* m, \(x, y\) = \(",
         ),
-        ({"path": {"shape": "circle", "radius": 0.01}}, "path 'circle' makes no course: it is 0.0628 m long"),
+        ({"path": {"shape": "circle", "radius": 1e-4}}, "path 'circle' makes no course: it is 0.000628 m long"),
         ({"path": "circel"}, "'circel'; did you mean 'circle'"),
         ({"control_period": 0.1}, r"time step of 0\.025 s cannot follow"),
     ],

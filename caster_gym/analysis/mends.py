@@ -121,7 +121,7 @@ def _columns(name: str, count: int) -> Iterator[Mend]:
             yield Mend(
                 f"{listed(columns)} {_are(columns)} in {_UNIT_WORDS[unit]}, not in {_UNIT_WORDS[wrongly]}",
                 _in_header(columns, unit),
-                lambda r, which=which, factor=factor: _scaled(r, name, dict.fromkeys(which, factor)),  # type: ignore
+                lambda r, which=which, factor=factor: _scaled(r, name, dict.fromkeys(which, factor)),  # type: ignore[misc, arg-type]
                 name,
             )
     for order in _orders(count):

@@ -27,10 +27,14 @@ def of_batch_step(types: tuple[Any, ...]) -> Work:
 def _words(world: Any, sizes: Any, how: str) -> str:
     task = "CasterTrack" if _part(world, "guide").instance_class is Timetable else "CasterFollow"
     around = " among obstacles" if _among_obstacles(world) else ""
-    seen = f", {_count(sizes, 'nearest')} observed obstacles" if _count(sizes, "nearest") else ""
-    return (
-        f"{_count(sizes, 'casters')} casters ({task}{around}, {_count(sizes, 'preview')} previewed points{seen}{how})"
-    )
+    nearest = _count(sizes, "nearest")
+    seen = f", {_several(nearest, 'observed obstacle')}" if nearest else ""
+    previewed = _several(_count(sizes, "preview"), "previewed point")
+    return f"{_count(sizes, 'casters')} casters ({task}{around}, {previewed}{seen}{how})"
+
+
+def _several(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _seconds(world: Any, sizes: Any, share: float) -> float:
