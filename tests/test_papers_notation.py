@@ -1,5 +1,7 @@
 """The papers' letters: what they call the same caster, and the robots that they assume."""
 
+import warnings
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -128,3 +130,9 @@ def test_robots_of_another_geometry_are_refused():
 def test_what_is_no_joint_of_the_papers_is_named(letters):
     with pytest.raises(ValueError, match=f"a letter θ or φ with a number, such as θ_1, got '{letters.split()[-1]}'"):
         in_words(letters)
+
+
+def test_a_robot_that_is_only_drawn_gives_no_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kim2001_robot(radius=0.1, trail=10.0)

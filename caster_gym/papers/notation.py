@@ -8,6 +8,7 @@
 A paper's joints of one caster come in the order η, θ, φ; joint sets are written such as (θ_1, φ_1, θ_2).
 """
 
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.analysis import joint_kinematics
+from caster_gym.plausibility import RobotWarning
 from caster_gym.robot import Caster, Footprint, Link, Motor, Platform, Robot, Wheel
 
 Array = NDArray[np.float64]
@@ -106,11 +108,13 @@ def kim2001_robot(radius: float, trail: float, a: float = 1.0) -> Robot:
         roll=motor,
         steer=motor,
     )
-    return Robot(
-        name="kim2001",
-        platform=Platform(mass=1.0, inertia=1.0, footprint=Footprint(polygon=pivots)),
-        casters=tuple(first.model_copy(update={"x": x, "y": y}) for x, y in pivots),
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)  # it is a drawing of a robot, in units of a
+        return Robot(
+            name="kim2001",
+            platform=Platform(mass=1.0, inertia=1.0, footprint=Footprint(polygon=pivots)),
+            casters=tuple(first.model_copy(update={"x": x, "y": y}) for x, y in pivots),
+        )
 
 
 class Lengths(NamedTuple):
