@@ -219,3 +219,9 @@ def test_a_file_of_a_loop_in_degrees_turns_once():
     samples = build_trajectories(path, ROBOT, 0.02)[0].samples
     turned = np.abs(np.diff(np.unwrap(np.arctan2(samples[:, 3], samples[:, 2])))).sum()
     assert turned == pytest.approx(2.0 * np.pi, rel=0.01)  # a spline through 24 rounded points wavers little
+
+
+@pytest.mark.parametrize(("shape", "text"), [("spline", "x,y\n0,0\n1,1\n"), ("timed", "time,x,y\n0,0,0\n5,1,1\n")])
+def test_the_file_of_a_mapping_may_be_a_path_object(tmp_path, shape, text):
+    (by_object,) = read_paths({"shape": shape, "file": written(tmp_path, text)})
+    assert by_object == read_paths({"shape": shape, "file": str(tmp_path / "path.csv")})[0]

@@ -5,6 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
+from caster_gym.configuration import ConfigurationError
+from caster_gym.paths import read_paths
 from caster_gym.paths.splines import Spline
 
 FULL = np.linspace(0.0, 2.0 * np.pi, 20001)
@@ -243,3 +245,10 @@ def test_significant_digits_are_a_rounding_too(digits):
     (path,) = Spline(waypoints=points, duration=20.0).trajectories(0.01)
     v, a = path.samples[100:-100, 4:6] @ [1.0, 1.0j], path.samples[100:-100, 7:9] @ [1.0, 1.0j]
     assert np.abs((v.conj() * a).imag / np.abs(v) ** 3).max() < 1.03 * 3.3333  # of the curve itself
+
+
+@pytest.mark.parametrize("waypoint", [[np.nan, 1.0], ["a", 1.0]])
+def test_a_number_that_is_none_is_told_and_no_heading_missed(waypoint):
+    with pytest.raises(ConfigurationError, match="number 1 of number 2 of 'waypoints' should be") as error:
+        read_paths({"shape": "spline", "waypoints": [[0.0, 0.0], waypoint]})
+    assert "missing" not in str(error.value)
