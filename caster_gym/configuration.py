@@ -121,10 +121,13 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """What is wrong, key by key, in sentences. Items of lists count from 1, as joints do."""
     problems = error.errors()
     deeper = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
+    wrong = {problem["loc"][:-2] for problem in problems if problem["type"] != "missing"}
     complaints: dict[tuple[str, str], list[str]] = {}  # by place and value: each member of a union has its own
     for problem in problems:
         if problem["type"] == "too_short" and problem["loc"] in deeper:
             continue  # only items without problems were counted
+        if problem["type"] == "missing" and "tuple[" in str(problem["loc"][-2:-1]) and problem["loc"][:-2] in wrong:
+            continue  # of the longer kind of item, where the shorter one is given
         place, message, value = _complaint(problem, model)
         told = complaints.setdefault((place, value), [])
         told += [message] if message not in told else []

@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 
 from caster_gym.tables import DECIMAL_COMMA, Column, Table, refuse_decimal_comma
+from caster_gym.units import is_unit
 
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat")
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks"}
@@ -27,10 +28,12 @@ def read_table(path: Path) -> Table:
     body = [(number, line) for number, line in lines[first:] if not _COMMENT.match(line)]
     if not lines:
         raise ValueError(f"{path} is empty; it needs a header such as x,y and a row for each point")
-    if body and not _has_numbers([body[0][1]]):
+    if body and not _is_of_numbers(body[0][1]):
         separator = _separator(body[0][1])
         header = _header(body[0][1], separator)
+        below = [line for number, line in lines if body[0][0] < number < (body[1:] or [(0, "")])[0][0]]
         body = body[1:]
+        header = next(filter(None, (_with_units_of(line, header) for line in below)), header)
     else:
         header, separator = _commented_header(path, [line for _, line in lines[:first]], body)
     while header and not header[-1].name:
@@ -53,12 +56,16 @@ def read_text(path: Path) -> str:
         raise ValueError(f"{path} cannot be read: {error.strerror or error}") from error
     marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
     try:
-        return content.decode(marks.get(content[:2], "utf-8-sig"))
+        text = content.decode(marks.get(content[:2], "utf-8-sig"))
     except UnicodeDecodeError as error:
         text = content.decode("cp1252", errors="replace")
         if any(sign not in _OF_SYMBOLS for sign in text if ord(sign) > 127):
-            raise ValueError(f"{path} cannot be read as CSV: {error}; save it as UTF-8") from error
-        return text
+            if b"\0" not in content:
+                raise ValueError(f"{path} cannot be read as CSV: {error}; save it as UTF-8") from error
+            text = content.decode("latin-1")
+    if "\0" in text:
+        raise ValueError(f"{path} holds zero bytes, as no table in UTF-8 does; export it as CSV in UTF-8")
+    return text
 
 
 def _separator(line: str) -> str:
@@ -82,25 +89,44 @@ def _column(cell: str) -> Column:
     return Column(match[1].strip(), match[2]) if match else Column(text, None)
 
 
-def _has_numbers(cells: list[str]) -> bool:
-    """Whether cells of a line hold numbers, be their decimals behind commas, rather than names alone."""
-    parts = [part for cell in cells for part in re.split(r"[;,\s]+", cell.strip())]
+def _has_numbers(cells: list[str], within: bool = True) -> bool:
+    """Whether cells of a line hold numbers, be their decimals behind commas, rather than names alone.
+
+    within: also where a number is only a part of a cell that blanks separate.
+    """
+    parts = [part for cell in cells for part in re.split(r"[;,\s]+" if within else r"[;,]", cell.strip())]
     return any(re.fullmatch(r"[-+−]?(\d[\d.]*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", part, re.I) for part in parts)
+
+
+def _is_of_numbers(line: str) -> bool:
+    """Whether some cell of a line is a number, rather than a name that has one in it, as in `wheel 1`."""
+    return _has_numbers([cell.strip() for cell in _cells(line, _separator(line))], within=False)
+
+
+def _with_units_of(comment: str, header: list[Column]) -> list[Column] | None:
+    """The header with the units of a comment below it, or None if these are none."""
+    line = _COMMENT.sub("", comment, count=1).strip()
+    units = _units_below(_cells(line, _separator(line)), header)
+    if units is None or not all(unit is None or is_unit(unit.strip("[]()")) for unit in units):
+        return None
+    return [Column(c.name, unit or c.unit) for c, unit in zip(header, units, strict=True)]
 
 
 def _commented_header(path: Path, comments: list[str], body: list[tuple[int, str]]) -> tuple[list[Column], str]:
     """Header and separator of a table whose first line that is no comment holds numbers."""
     separator = _separator(body[0][1]) if body else ","
     count = len([cell for cell in _cells(body[0][1], separator) if cell.strip()]) if body else 0
-    if comments:
-        line = _COMMENT.sub("", comments[-1], count=1).strip()
+    likely = []
+    for number, comment in enumerate(comments):
+        line = _COMMENT.sub("", comment, count=1).strip()
         header = _header(line, _separator(line))
-        if (
-            (len(header) == count or not body)
-            and len(header) > 1
-            and not _has_numbers([column.name for column in header])
-        ):
-            return header, separator
+        if (len(header) == count or not body) and len(header) > 1 and not _is_of_numbers(line):
+            likely.append((number, header))
+    if likely:
+        for number, header in likely:  # that has its units in a line of their own
+            if number + 1 < len(comments) and (known := _with_units_of(comments[number + 1], header)) is not None:
+                return known, separator
+        return next((one for _, one in reversed(likely) if _names_axes(one)), likely[-1][1]), separator
     if path.suffix.lower() == ".tum" and count == len(_TUM):
         return [Column(name, "s" if name == "timestamp" else None) for name in _TUM], separator
     if body and len(body[0][1].split()) == count == 1 and DECIMAL_COMMA.fullmatch(body[0][1]):
@@ -112,10 +138,17 @@ def _commented_header(path: Path, comments: list[str], body: list[tuple[int, str
     )
 
 
+def _names_axes(header: list[Column]) -> bool:
+    """Whether some name of a header begins or ends as that of a coordinate does."""
+    return any(re.search(r"(^|[_./\s])[pt]?x([_./\s]|$)", column.name.casefold()) for column in header)
+
+
 def _units_below(cells: list[str], header: list[Column]) -> list[str | None] | None:
     """Units in a line below the header, or None if that line is none of units."""
     texts = [cell.strip().strip("[]()").strip() for cell in cells]
     if len(texts) != len(header) or not any(texts) or _has_numbers(cells):
+        return None
+    if not any(is_unit(text) for text in texts):
         return None
     return [text if text not in ("", "-", "–") else None for text in texts]
 

@@ -119,7 +119,9 @@ class Table:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise ValueError(f"{where}: {self.columns[place].name!r} must be a finite number, got {cell.strip()!r}")
+            clock = "; write times in seconds" if re.search(r"\d:\d", cell) else ""
+            name = self.columns[place].name
+            raise ValueError(f"{where}: {name!r} must be a finite number, got {cell.strip()!r}{clock}")
         return number
 
     def times(self) -> tuple[Array, float]:
@@ -144,9 +146,11 @@ class Table:
         steps = np.diff(since)
         if (steps <= 0.0).any():
             row = int((steps <= 0.0).argmax()) + 1
+            same = "leave one of the two lines out, or write more digits"
             raise ValueError(
                 f"{self.source}, line {self.lines[row]}: {name!r} must grow from line to line, got "
-                f"{self.rows[row][place].strip()} after {self.rows[row - 1][place].strip()}"
+                f"{self.rows[row][place].strip()} after {self.rows[row - 1][place].strip()}; "
+                f"{same if steps[row - 1] == 0.0 else 'sort the lines by it'}"
             )
         if not declared and len(steps) >= _MANY and float(np.median(steps)) >= SPARSEST:
             raise ValueError(
@@ -160,7 +164,7 @@ def note_left_out(source: str, names: Sequence[str], why: str = "not needed") ->
     """Tell which columns are left out."""
     if names:
         one = len(names) == 1
-        columns = ", ".join(names)
+        columns = ", ".join(name or "without a name" for name in names)
         note(f"{source}: the column{'' if one else 's'} {columns} {'is' if one else 'are'} left out, {why}")
 
 
@@ -180,7 +184,7 @@ def _rank(column: Column, quantity: Quantity) -> int | None:
 
 def _clean(name: str) -> str:
     plain = name.strip().strip("\"'").casefold()
-    return re.sub(r"[\s/.\-]+", "_", plain.lstrip("/"))
+    return re.sub(r"[\s/.\-]+", "_", plain.lstrip("/").removeprefix("field."))
 
 
 def _tail(name: str) -> str:

@@ -48,6 +48,11 @@ def read_unit(text: str, quantity: str) -> str | None:
     return None
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of some quantity."""
+    return any(read_unit(text, quantity) for quantity in UNITS)
+
+
 def unlikely_radians(angles: ArrayLike) -> float | None:
     """The first of some angles in a row that can hardly be radians, or None.
 

@@ -154,6 +154,7 @@ def test_hermite_is_exact_for_cubics():
         ([(0, 0, 0), (1, 0, 0), (1, 0, 2), (2, 0, 2)], r"turns on the spot at s = 1 m, \(x, y\) = \(1, 0\) m"),
         ([(1, 1, 0), (1, 1, 2)], "turns on the spot and leads nowhere"),
         ([(1, 1)], "stands still and leads nowhere"),
+        ([(0, 0), (1e9, 0)], r"1e\+09 m long, over 500000 rows of 0.02 m; its unit must be metres"),
     ],
 )
 def test_a_path_that_rests_on_its_way_is_refused_with_the_place(waypoints, what):

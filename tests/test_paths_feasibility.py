@@ -146,6 +146,17 @@ def test_friction_beyond_the_motors_cannot_be_helped_by_going_slower():
         build_trajectories("circle", stuck, 0.02)
 
 
+def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they_take():
+    """A hundred times the duration would do, and nothing at all for what lies beyond a million time steps."""
+    path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
+    with pytest.raises(ValueError, match="would do") as error:
+        build_trajectories(path, ROBOT, 0.1)
+    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    assert build_trajectories({**path, "duration": duration}, ROBOT, 0.1)
+    with pytest.raises(ValueError, match="nothing within 1000000 time steps would do"):
+        build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 6e4}, ROBOT, 0.1)
+
+
 def test_a_feasible_path_passes_in_silence():
     (circle,) = read_paths("circle")
     assert check_feasible(circle, circle.trajectories(0.02), ROBOT) is None

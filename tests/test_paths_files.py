@@ -155,11 +155,15 @@ def test_a_file_named_in_a_yaml_file_starts_from_its_folder(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("lat,lon\n0,0\n", "no column is called 'x' or 'y'; the header names lat, lon; call the coordinates x and y"),
+        ("lat,lon\n52.52,13.4\n", "latitude and longitude; project them to metres, .* and call these x and y"),
+        ("u,v\n0,0\n", "no column is called 'x' or 'y'; the header names u, v; call the coordinates x and y"),
+        ("x,y,qz,qw\n0,0,0,1\n1,0,0,0\n", "line 3: the quaternion is zero and says no heading; leave its columns out"),
         ("x,z\n0,0\n", "no column is called 'y'"),
         ("x;y\n0;0\n1,5;1\n", "line 3: '1,5' has a decimal comma"),
         ("x,y,heading\n0,0,0\n1,0,90\n", r"'heading': a heading of 90 .* write `unit: deg` .* as in 'heading \[deg\]'"),
-        ("time,x,y\n0,0,0\n2,1,1\n2,2,2\n", "line 4: 'time' must grow from line to line, got 2 after 2"),
+        ("time,x,y\n0,0,0\n2,1,1\n2,2,2\n", "line 4: 'time' must grow from line to line, got 2 after 2; leave one of"),
+        ("time,x,y\n0,0,0\n2,1,1\n1,2,2\n", "got 1 after 2; sort the lines by it"),
+        ("time,x,y\n10:00:01,0,0\n10:00:02,1,1\n", "got '10:00:01'; write times in seconds"),
         ("x,y\n0,0\n1,nan\n", "line 3: 'y' must be a finite number, got 'nan'"),
     ],
 )
@@ -215,3 +219,9 @@ def test_a_file_of_a_loop_in_degrees_turns_once():
     samples = build_trajectories(path, ROBOT, 0.02)[0].samples
     turned = np.abs(np.diff(np.unwrap(np.arctan2(samples[:, 3], samples[:, 2])))).sum()
     assert turned == pytest.approx(2.0 * np.pi, rel=0.01)  # a spline through 24 rounded points wavers little
+
+
+@pytest.mark.parametrize(("shape", "text"), [("spline", "x,y\n0,0\n1,1\n"), ("timed", "time,x,y\n0,0,0\n5,1,1\n")])
+def test_the_file_of_a_mapping_may_be_a_path_object(tmp_path, shape, text):
+    (by_object,) = read_paths({"shape": shape, "file": written(tmp_path, text)})
+    assert by_object == read_paths({"shape": shape, "file": str(tmp_path / "path.csv")})[0]

@@ -130,6 +130,7 @@ def test_versions_of_path_planner_without_a_start_or_with_angles_at_waypoints(tm
     [
         ({"trajectory": {"samples": []}}, "has 0 samples; generate the trajectory before it is exported"),
         ({"a": 1}, "is none of the JSON files that are known"),
+        ([[0.0, 0.0], [1.0, 0.0]], "is none of the JSON files that are known"),
         ('{"a": 1', "line 1: cannot be read as JSON"),
         ([{"time": 0.0}, {"time": 1.0}], "'x' is missing or of the wrong kind"),
         ([{"x": 0.0, "y": 0.0, "heading": 0.0}] * 2, "'time' is missing"),

@@ -76,3 +76,16 @@ def test_a_long_gap_between_dense_points_is_bridged():
     spline, _ = smoothed_curve(points, np.ones(1000), 5e-5, False, np.inf)
     x, y = spline(np.linspace(0.0, 1.0, 300)).T
     assert abs(y - 0.1 * x**2).max() < 5e-3  # the tangents at both sides are known to about 1 %
+
+
+@pytest.mark.parametrize("tolerance", [0.0005, 0.001, 0.01])
+def test_no_curve_swings_out_between_points_whose_noise_is_larger_than_the_tolerance(tolerance):
+    """Such a curve was 10,000 km long, or none at all, as its coefficients were undetermined."""
+    t = np.linspace(0.0, 2.0 * np.pi, 500)
+    points = np.column_stack([1.5 * np.sin(t), 0.8 * np.sin(2.0 * t)])
+    points += np.random.default_rng(1).normal(0.0, 0.02, points.shape)
+    chords = np.hypot(*np.diff(points, axis=0).T).sum()
+    spline, at = smoothed_curve(points, np.ones(500), tolerance, False, np.inf)
+    if spline is not None:
+        assert np.hypot(*np.diff(spline(np.linspace(0.0, 1.0, 20001)), axis=0).T).sum() < 1.5 * chords
+    assert (np.diff(at) > 0.0).all()

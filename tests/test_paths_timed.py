@@ -285,3 +285,22 @@ def test_reading_paths_leaves_scipy_alone():
     reads = "from caster_gym.paths import read_paths; read_paths([(0, 0, 0, 0), (1, 1, 1, 1)])"
     command = f"import sys; {reads}; print('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", command], capture_output=True, text=True).stdout.strip() == "False"
+
+
+def test_a_record_that_starts_to_turn_and_to_move_at_once_has_a_way():
+    """First steps from rest are tiny, and no turns on the spot: all files of Choreo and WPILib start so."""
+    t = np.linspace(0.0, 8.0, 161)
+    s = (t / 8.0) ** 3 * (10.0 - 15.0 * (t / 8.0) + 6.0 * (t / 8.0) ** 2)
+    poses = np.column_stack([t, 2.0 * s, np.sin(2.0 * s), 3.0 * s])
+    (course,) = build_courses(poses, ROBOT, 1.0)
+    angle = np.unwrap(np.arctan2(course.samples[:, 6], course.samples[:, 5]))
+    assert_allclose(angle[[0, -1]], [0.0, 3.0], atol=1e-3)
+
+
+def test_what_is_advised_for_following_a_timed_path_has_its_own_fields():
+    """A timed path has no duration to be given."""
+    poses = [[0, 0, 0, 0], [1, 1, 0, 0], [2, 1, 0, 2], [3, 2, 0, 2]]
+    with pytest.raises(ValueError, match=r"path 'timed' makes no course: .*turns on the spot") as error:
+        build_courses(poses, ROBOT, 1.0)
+    found = re.search(r"CasterTrack drives it with a stretch of at least (\d[\d.]*)$", str(error.value))
+    assert found and build_trajectories({"shape": "timed", "poses": poses, "stretch": float(found[1])}, ROBOT, 0.02)

@@ -5,6 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
+from caster_gym.configuration import ConfigurationError
+from caster_gym.paths import read_paths
 from caster_gym.paths.splines import Spline
 
 FULL = np.linspace(0.0, 2.0 * np.pi, 20001)
@@ -224,3 +226,29 @@ def test_headings_smoothed_on_a_turning_round_keep_their_turns():
     angle, rate, _ = spline.turn(u, spline.curve(2.0 * u))
     assert angle[-1] - angle[0] == pytest.approx(4.0 * np.pi, abs=1e-6)
     assert_allclose(rate, 4.0 * np.pi, rtol=0.02)
+
+
+def test_noise_that_rounding_does_not_explain_is_told():
+    t = np.linspace(0.0, 2.0 * np.pi, 500)
+    points = np.column_stack([1.5 * np.sin(t), 0.8 * np.sin(2.0 * t)])
+    noisy = (points + np.random.default_rng(5).normal(0.0, 0.001, points.shape)).round(3)
+    assert "zigzag by about 0.002 m" in Spline(waypoints=noisy.tolist()).description
+    assert "zigzag" not in Spline(waypoints=points.round(3).tolist()).description
+
+
+@pytest.mark.parametrize("digits", [3, 4, 5, 6])
+def test_significant_digits_are_a_rounding_too(digits):
+    """Values near 0 have more decimals than others; the curvature was 2.4 instead of 1.39 1/m for 4 digits."""
+    t = np.linspace(0.0, 2.0 * np.pi, 500)
+    columns = 1.5 * np.sin(t), 0.8 * np.sin(2.0 * t)
+    points = [(float(f"{x:.{digits}g}"), float(f"{y:.{digits}g}")) for x, y in zip(*columns, strict=True)]
+    (path,) = Spline(waypoints=points, duration=20.0).trajectories(0.01)
+    v, a = path.samples[100:-100, 4:6] @ [1.0, 1.0j], path.samples[100:-100, 7:9] @ [1.0, 1.0j]
+    assert np.abs((v.conj() * a).imag / np.abs(v) ** 3).max() < 1.03 * 3.3333  # of the curve itself
+
+
+@pytest.mark.parametrize("waypoint", [[np.nan, 1.0], ["a", 1.0]])
+def test_a_number_that_is_none_is_told_and_no_heading_missed(waypoint):
+    with pytest.raises(ConfigurationError, match="number 1 of number 2 of 'waypoints' should be") as error:
+        read_paths({"shape": "spline", "waypoints": [[0.0, 0.0], waypoint]})
+    assert "missing" not in str(error.value)

@@ -36,6 +36,9 @@ PLAIN = "x [m],y [m],heading [deg]\n0,0,0\n1,2,90\n"
         "x / m,y / m,heading / deg\n0,0,0\n1,2,90\n",
         "x in m,y in m,heading in deg\n0,0,0\n# a note\n1,2,90\n",
         PLAIN.encode("utf-16"),
+        "x,y,heading\n# m, m, deg\n0,0,0\n1,2,90\n",
+        "# x,y,heading\n# [m],[m],[deg]\n0,0,0\n1,2,90\n",
+        "# x [m],y [m],heading [deg]\n# exported,at,noon\n0,0,0\n1,2,90\n",
         "sep=;\n" + PLAIN.replace(",", ";"),
     ],
 )
@@ -61,6 +64,19 @@ def test_lines_are_counted_as_an_editor_counts_them(tmp_path):
     assert read(tmp_path, "# made by hand\n\nx,y\n0,0\n\n# more\n1,1\n").lines == [4, 7]
 
 
+@pytest.mark.parametrize("name", ["Unnamed: 0", "wheel 1", "run 2024-01-02"])
+def test_names_of_columns_may_have_numbers_in_them(tmp_path, name):
+    """pandas calls an index that was written without a name 'Unnamed: 0'."""
+    table = read(tmp_path, f"{name},x,y\n0,1,2\n")
+    assert [column.name for column in table.columns] == [name, "x", "y"]
+    assert table.rows == [["0", "1", "2"]]
+
+
+@pytest.mark.parametrize("word", ["True", "0.0D+00", "furlong"])
+def test_a_row_of_words_that_are_no_units_is_a_row(tmp_path, word):
+    assert read(tmp_path, f"x,y\n{word},{word}\n").rows == [[word, word]]
+
+
 def test_a_tum_file_has_no_header(tmp_path):
     row = "1305031098.6659 1.35 0.63 1.66 0.0 0.0 0.7071 0.7071\n"
     assert [column.name for column in read(tmp_path, row + row, "a.tum").columns][:3] == ["timestamp", "tx", "ty"]
@@ -78,6 +94,8 @@ def test_a_tum_file_has_no_header(tmp_path):
             "x,y\n0,0,0,0\n1,5,0,5\n",
             "line 2: .* got 4 cells: '0,0,0,0'; if these are decimal commas, write decimal points",
         ),
+        ("x,y\n0,0\n".encode("utf-16-le"), "holds zero bytes, .*; export it as CSV in UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "holds zero bytes"),
         (b"x,y\n\xff\xfe\n", "cannot be read as CSV: .*; save it as UTF-8"),
     ],
 )

@@ -17,6 +17,7 @@ LINE_COLUMNS = ("x", "y", "tx", "ty", "curvature", "cos", "sin", "bend", "bend_s
 MOST_ROW_TURN = 0.5  # [rad] of the tangent or the heading within one row: what lies between rows is interpolated
 _MOST_ROWS = 100_000  # a line that needs more has a corner
 LEAST_ROWS = 5  # fewer do not show a way that is started and ended at rest
+_LONGEST = 500_000  # rows of a line; they take half a minute for each 100,000
 _LIMIT_WAY = 1e-3  # [-] of the spacing: nearer to an end, at rest, quotients by the speed give way to their limits
 
 
@@ -72,6 +73,8 @@ def line_along(trajectory: Trajectory, spacing: float, free_heading: bool) -> Li
     if count < LEAST_ROWS:
         what = f"it is {length:.3g} m long, less than {LEAST_ROWS} rows of {spacing:g} m"
         raise CoarseSpacingError(what, _finer(nodes, LEAST_ROWS))
+    if count > _LONGEST:
+        raise NoLineError(f"it is {length:.4g} m long, over {_LONGEST} rows of {spacing:g} m; its unit must be metres")
     _refuse_sharp_turns(nodes, count)
     s = np.linspace(0.0, length, count + 1)
     tangent = _unit(hermite(nodes.s, nodes.tangent, 1j * nodes.curvature * nodes.tangent, s))

@@ -1,5 +1,6 @@
 """Paths to be followed at the robot's own pace: where they lead, and how fast the robot's motors can drive them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +110,7 @@ def build_courses(
     lines: list[Line] = []
     for specification in read_paths(path):
         way = specification.geometry() if isinstance(specification, Timed) else specification
-        made = _lines(way, robot, spacing, free_heading)
+        made = _lines(way, robot, spacing, free_heading, specification)
         lines.extend(line if way is specification else line._replace(name=specification.shape) for line in made)
     names = named_apart([line.name for line in lines])
     lines = [line._replace(name=name) for line, name in zip(lines, names, strict=True)]
@@ -120,8 +121,13 @@ def build_courses(
     )
 
 
-def _lines(specification: AnyPath, robot: Robot, spacing: float | None, free_heading: bool) -> list[Line]:
-    """The lines of one specification; ValueError says what would make one that there is none of."""
+def _lines(
+    specification: AnyPath, robot: Robot, spacing: float | None, free_heading: bool, source: AnyPath
+) -> list[Line]:
+    """The lines of one specification; ValueError says what would make one that there is none of.
+
+    source: the path that is written, of whose poses the specification may be the way.
+    """
     try:
         return _lines_as_they_are(specification, spacing, free_heading)
     except _RefusedError as error:
@@ -129,14 +135,25 @@ def _lines(specification: AnyPath, robot: Robot, spacing: float | None, free_hea
         if coarse and spacing is not None:
             raise ValueError(str(error)) from error
         remedies = [] if free_heading or not _makes_lines(specification, True) else ["a free heading"]
-        wider = next((words for one, words in specification.wider() if _makes_lines(one, free_heading)), None)
+        wider = next((words for one, words in _wider(specification, source) if _makes_lines(one, free_heading)), None)
         remedies += [wider] if wider else []
         advice = f"; {' or '.join(remedies)} would do" if remedies else ""
-        timed = timed_remedy(specification, robot, _TIMED_STEP)
+        timed = timed_remedy(source, robot, _TIMED_STEP)
         if timed is not None:
-            how = f"with {timed}" if timed else "as it is, in the time of its 'duration'"
+            by = "at its own times" if isinstance(source, Timed) else "in the time of its 'duration'"
+            how = f"with {timed}" if timed else f"as it is, {by}"
             advice += f"; CasterTrack drives it {how}"
-        raise ValueError(f"{error}{advice}") from error
+        what = str(error).replace(repr(specification.shape), repr(source.shape))
+        raise ValueError(f"{what}{advice}") from error
+
+
+def _wider(specification: AnyPath, source: AnyPath) -> Iterator[tuple[AnyPath, str]]:
+    """Wider versions of a specification, as its source would give them."""
+    for one, words in specification.wider():
+        if isinstance(source, Timed) and isinstance(one, Spline):
+            yield source.model_copy(update={"tolerance": one.tolerance}).geometry(), words
+        else:
+            yield one, words
 
 
 class _RefusedError(ValueError):

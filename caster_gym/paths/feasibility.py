@@ -22,11 +22,12 @@ from caster_gym.mechanics.motors import motor_ranges, motor_speeds
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, total
 from caster_gym.paths.trailing import trailing_directions
-from caster_gym.paths.trajectory import Array, Plane, Trajectory
+from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory
 from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
+_SLOW, _FALLS = 64.0, 0.9  # [-] factor of ease, from which on the use of motors must fall so much as it doubles
 _BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
 
 
@@ -77,8 +78,7 @@ def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Rob
     k = int(hardest.use.argmax())
     if hardest.use[k] <= 1.0:
         return
-    gentler = _gentler(path, trajectories[k].time_step, robot)
-    remedy = f"{gentler.remedy} would do" if gentler is not None else "going slower does not help"
+    remedy = _remedy(path, trajectories, robot)
     raise ValueError(f"path {trajectories[k].name!r} {_complaint(hardest, k, robot)}; {remedy}")
 
 
@@ -95,20 +95,26 @@ def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
     return f"asks {torque:.2g} N m of {joint} {when}, where its motor has {hardest.left[k]:.2g} N m left"
 
 
-def _gentler(path: Easable, time_step: float, robot: Robot) -> Easable | None:
-    """The path eased by little more than it must be, or None if a factor of 64 is not enough."""
+def _remedy(path: Easable, trajectories: Sequence[Trajectory], robot: Robot) -> str:
+    """What would do for a path that is too fast: to ease it by little more than it must be, if that is enough."""
+    time_step = trajectories[0].time_step
 
-    def does(factor: float) -> bool:
-        return bool((motor_use(path.eased(factor).trajectories(time_step), robot).use <= 1.0).all())
+    def use(factor: float) -> float:
+        return float(motor_use(path.eased(factor).trajectories(time_step), robot).use.max())
 
-    high = next((factor for factor in (2.0, 4.0, 8.0, 16.0, 32.0, 64.0) if does(factor)), None)
-    if high is None:
-        return None
+    high, asked = 1.0, np.inf
+    while asked > 1.0:
+        high, before = 2.0 * high, asked
+        if high * trajectories[0].duration > MOST_STEPS * time_step:
+            return f"nothing within {MOST_STEPS} time steps would do"
+        asked = use(high)
+        if high >= _SLOW and 1.0 < asked > _FALLS * before:
+            return "going slower does not help"  # what is left is not due to the pace
     low = max(1.0, 0.5 * high)
     while high > 1.02 * low:
         middle = (low * high) ** 0.5
-        low, high = (low, middle) if does(middle) else (middle, high)
-    return path.eased(high)
+        low, high = (low, middle) if use(middle) <= 1.0 else (middle, high)
+    return f"{path.eased(high).remedy} would do"
 
 
 def _hardest(samples: Array, psi: Plane, time_step: float, robot: RobotParameters) -> tuple[Array, ...]:

@@ -24,23 +24,26 @@ PATH_SUFFIXES = (*TABLE_SUFFIXES, *PLANNER_SUFFIXES)
 
 TIME = Quantity(
     "time",
-    ("time", "t", "timestamp", "stamp", "time_stamp", "header_stamp", "__time", "elapsed", "elapsed_time"),
-)
+    ("time", "t", "timestamp", "stamp", "time_stamp", "header_stamp", "__time", "elapsed", "elapsed_time", "secs",
+     "sec", "seconds"),
+)  # fmt: skip
 HEADING = Quantity("angle", ("heading", "theta", "yaw", "th", "orientation_yaw", "pose_theta", "pose_heading"))
 POINT = {
     axis: Quantity(
         "length",
         (axis, f"p{axis}", f"pos_{axis}", f"position_{axis}", f"{axis}_pos", f"{axis}_position", f"translation_{axis}",
-         f"t{axis}", f"pose_{axis}", f"point_{axis}"),
+         f"t{axis}", f"pose_{axis}", f"point_{axis}", f"{wards}ing", f"utm_{wards}ing"),
     )
-    for axis in "xy"
+    for axis, wards in (("x", "east"), ("y", "north"))
 }  # fmt: skip
 QUATERNION = {
     f"q{axis}": Quantity("number", (f"q{axis}", f"q_{axis}", f"quat_{axis}", f"rotation_{axis}", f"orientation_{axis}"))
     for axis in "xyzw"
 }
 _QUANTITIES = {"time": TIME, **POINT, "heading": HEADING, "psi": Quantity("angle", ("psi",)), **QUATERNION}
+_DEGREES_OF_EARTH = ("lat", "latitude", "lon", "lng", "long", "longitude", "lat_deg", "lon_deg")
 _FITS, _DIFFERS = 0.2, 0.6  # [rad] mean difference from the direction of the way that says yes, and no
+_LEAST_QUATERNION = 0.1  # [-] length below which one was never set
 _CALM = 1.0  # [rad] from row to row: in between, angles that are wrapped jump by a turn
 _MANY = 10  # rows that show what is usual
 _GAP = 3.0  # [-] of the usual time between rows, from which on some are missing
@@ -109,6 +112,11 @@ def _table_of(path: Path) -> Table:
         raise ConfigurationError(str(error)) from error
     missing = [axis for axis in "xy" if axis not in table.found]
     if missing:
+        if any(column.name.strip().casefold() in _DEGREES_OF_EARTH for column in table.columns):
+            raise ConfigurationError(
+                f"{path} has places in latitude and longitude; project them to metres, east and north of a place "
+                f"nearby, and call these x and y"
+            )
         names = ", ".join(POINT["x"].names[:4])
         raise ConfigurationError(
             f"{path}: no column is called {' or '.join(map(repr, missing))}; the header names "
@@ -191,6 +199,12 @@ def planar_heading(table: Table) -> Array:
     """Heading [rad] of the body x-axis from a table's unit quaternions; qx and qy may be left out."""
     none = np.zeros(len(table.rows))
     x, y, z, w = (table.numbers([name])[:, 0] if name in table.found else none for name in QUATERNION)
+    short = np.hypot(np.hypot(x, y), np.hypot(z, w)) < _LEAST_QUATERNION
+    if short.any():
+        raise ValueError(
+            f"{table.source}, line {table.lines[int(short.argmax())]}: the quaternion is zero and says no heading; "
+            f"leave its columns out, and the robot faces its way"
+        )
     return np.asarray(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), dtype=np.float64)
 
 

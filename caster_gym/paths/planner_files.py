@@ -45,7 +45,7 @@ def read_planner_file(path: Path) -> dict[str, Any]:
 def _samples(content: Any) -> list[Any] | None:
     """The samples of a trajectory, wherever the versions of the tools have them."""
     if isinstance(content, list):
-        return content
+        return content if all(isinstance(one, dict) for one in content) else None
     if not isinstance(content, dict):
         return None
     inner = content.get("trajectory")

@@ -14,6 +14,8 @@ _MATTERS = 0.1  # [-] of the extent: step · n² beyond, rounding changes the se
 _GRID_SLACK = 0.02  # [-] of a grid's step: numbers that miss it by more do not lie on it
 _ALTERNATING = 0.6  # [-] share of turns that go to and fro, from which on they are noise
 _FINEST_DIGIT = 9
+_FINER = 0.3  # [-] of the median step by significant digits: a grid that is coarser explains the values as well
+_FEWEST_DIGITS, _MOST_DIGITS = 3, 7  # significant ones of a number that was rounded to so many
 _ROUNDED = 1.0 / 12.0**0.5  # root mean square error of numbers that were rounded to a step of 1
 HEADING_UNITS = (1.0, np.pi / 180.0, np.pi / 32768.0)  # [rad] radians, degrees, ticks of encoders
 
@@ -34,9 +36,27 @@ def grid_step(values: Array, units: Sequence[float] = (1.0,)) -> float:
     return 0.0
 
 
+def _digit_step(values: Array, grid: float) -> float:
+    """Step of the grid on which values (n,) lie; of so many significant digits, if small values have finer ones.
+
+    As those of "%.5g" do, which MATLAB and streams of C++ write unless told otherwise: then the root mean square.
+    """
+    size = np.abs(values[values != 0.0])
+    if not len(size):
+        return grid
+    power = np.floor(np.log10(size) + 1e-12)
+    for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1):
+        step = 10.0 ** (power - digits + 1.0)
+        scaled = size / step
+        if (np.abs(scaled - np.rint(scaled)) <= 1e-6).all():
+            finer = grid < _FINER * float(np.median(step))
+            return float(np.sqrt(np.mean(step**2))) if finer else grid
+    return grid
+
+
 def rounding(columns: Array, units: Sequence[float] = (1.0,)) -> tuple[float, float]:
     """Root mean square error of rows (n, d) that were rounded, and the step; zeros where it would not bend a curve."""
-    steps = np.array([grid_step(column, units) for column in columns.T])
+    steps = np.array([_digit_step(column, grid_step(column, units)) for column in columns.T])
     step, extent = float(steps.max()), float(np.ptp(columns, axis=0).max())
     if not _matters(step, len(columns), extent) or (step > _FINE * extent and not _falls_together(columns)):
         return 0.0, 0.0

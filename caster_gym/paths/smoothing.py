@@ -23,6 +23,7 @@ _LEAST_PIECE = 0.1  # [-] of the median distance between places: knots are no ne
 _WEAKEST, _STIFF, _STRONGEST = -9.0, 4.0, 9.0
 _BISECTIONS = 16  # to 2e-4 of a power
 _PASSES = 3  # of fits at the arc lengths of the fit before: chords between noisy points are too long, and unequal
+_LONGEST = 1.5  # [-] of the way from point to point: a longer curve swings out between its knots
 _FINE = 8  # samples for each piece, from which an arc length is summed
 
 
@@ -110,13 +111,20 @@ def _derivative(knots: Array) -> Any:
 
 
 def smoothed_curve(points: Array, weights: Array, tolerance: float, closed: bool, most: float) -> tuple[Any, Array]:
-    """The spline beside points (n, 2), walked at an even pace over 0 … 1, and the places (n,) of the points on it."""
+    """The spline beside points (n, 2), walked at an even pace over 0 … 1, and the places (n,) of the points on it.
+
+    None instead of the spline where there is none so near to the points: noise that is larger than the tolerance leaves
+    the coefficients undetermined, and the curve swings out between its knots.
+    """
     chords = np.hypot(*np.diff(points, axis=0).T)
-    at = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
-    for _ in range(_PASSES):
+    by_chords = at = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
+    for fits in range(_PASSES + 1):
         spline = smoothed(points, at, weights, tolerance, closed, most)
         fine = np.linspace(0.0, 1.0, _FINE * len(spline.c) + 1)
         pace = np.hypot(*spline(fine, 1).T)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]))])
-        at = np.interp(at, fine, way / way[-1])
-    return smoothed(points, at, weights, tolerance, closed, most), at
+        if way[-1] > _LONGEST * len(fine) * chords.sum():
+            return None, by_chords
+        if fits < _PASSES:
+            at = np.interp(at, fine, way / way[-1])
+    return spline, at

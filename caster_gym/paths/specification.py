@@ -98,9 +98,10 @@ def _size_of_points(items: list[Any]) -> int | None:
     if not numbers:
         return None
     if len(sizes) > 1 or not sizes <= set(_POINT_SIZES):
+        got = " to ".join(str(size) for size in sorted({min(sizes), max(sizes)}))
         raise ConfigurationError(
             f"a list of points has (x, y) or (x, y, heading) for each waypoint of a spline, or (time, x, y, heading) "
-            f"for each pose of a timed path, the same for all of them; got {min(sizes)} to {max(sizes)} numbers"
+            f"for each pose of a timed path, the same for all of them; got {got} numbers"
         )
     return sizes.pop()
 

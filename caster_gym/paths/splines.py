@@ -56,7 +56,7 @@ class Spline(Shape):
             if "waypoints" in content:
                 raise ValueError("give either 'waypoints' or a 'file' of them, not both")
             file, unit, zero_axis = Path(str(content["file"])), content.get("unit"), content.get("zero_axis")
-            return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest}
+            return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest, "file": str(file)}
         waypoints = plain(content.get("waypoints"))
         if not isinstance(waypoints, list) or not all(isinstance(one, list) and len(one) == 3 for one in waypoints):
             return content if waypoints is None else {**content, "waypoints": waypoints}

@@ -50,7 +50,8 @@ class Timed(Frozen):
             if "poses" in content:
                 raise ValueError("give either 'poses' or a 'file' of them, not both")
             found = read_poses(Path(str(content["file"])), content.get("unit"), content.get("zero_axis"))
-            return {**{key: value for key, value in content.items() if key != "unit"}, **found}
+            rest = {key: value for key, value in content.items() if key != "unit"}
+            return {**rest, **found, "file": str(content["file"])}
         poses = plain(content.get("poses"))
         if not isinstance(poses, list) or not all(isinstance(pose, list) and len(pose) == 4 for pose in poses):
             return {**content, "poses": poses} if poses is not None else content

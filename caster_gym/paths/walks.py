@@ -24,7 +24,8 @@ class Walk:
         angles = np.zeros(len(leg.points)) if leg.headings is None else leg.headings
         turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angles)))])
         self.way, self.turning = float(lengths[-1]), float(turned[-1])  # [m], [rad]
-        # None: through the places; a turn on the spot has its stations by its angles
+        # None: through the places, also where nothing smooth is as near to them as the tolerance
+        # a turn on the spot has its stations by its angles
         self._smooth: Any = None
         self._smooth_headings: Any = None
         self._stations = lengths / self.way if self.way > 0.0 else turned / max(self.turning, 1e-300)

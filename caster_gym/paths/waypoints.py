@@ -19,8 +19,10 @@ _NEARLY = 1e-3  # [-] of the median spacing: below, two waypoints are one as wel
 _JITTER = 0.05  # [-] of the spacings on both sides: a step that is shorter and leads elsewhere is a repeated waypoint
 _SIDEWAYS = 0.5**0.5  # cosine of the angle from which on a step leads elsewhere
 _NEAR_END = 2e-3  # [m] a closed path whose last waypoint is nearer to its first repeats it
+_MORE = 2.0  # [-] of a tolerance that rounding explains: a greater zigzag is noise, and told
 _GROUP = 3.0  # [-] of the tolerance: waypoints this near to the first of them are seen as one place, at their mean
 _LEAST_SPOT_TURN = 1e-6  # [rad] on exact waypoints
+_SPOT = 50.0  # [rad/m] a turn that is sharper over the little way between waypoints of one place is one on the spot
 _LEAST_NOISY_SPOT_TURN = 0.5  # [rad] on rounded or noisy ones, which may stay at a place for some rows on their way
 
 
@@ -72,9 +74,9 @@ def read_track(
     if allowed > 0.0:
         why = f"as they are rounded to {step:g} m" if tolerance is None else "as its tolerance allows"
         notes.insert(0, f"smoothed, at {allowed:.2g} m from the waypoints (root mean square), {why}")
-    elif tolerance is None and (noise := zigzag(rows[:, :2])) > 0.0:
+    if tolerance is None and (noise := zigzag(rows[:, :2])) > _MORE * allowed:
         notes.insert(0, f"its waypoints zigzag by about {noise:.1g} m: a tolerance of that would smooth it")
-    elif tolerance is None and is_coarse(rows[:, :2]):
+    elif tolerance is None and allowed == 0.0 and is_coarse(rows[:, :2]):
         notes.insert(0, "led through waypoints on a coarse grid; if that is rounding, a tolerance would smooth it")
     if turn_allowed > 0.0:
         notes.append(headings_note(turn_allowed, turn_step if heading_tolerance is None else None))
@@ -177,7 +179,10 @@ def _legs(rows: Array, closed: bool, laps: int, lap_turn: float, tolerance: floa
     spots = np.zeros(len(firsts), dtype=bool)
     if rows.shape[1] == 3:
         turns = np.maximum.reduceat(rows[:, 2], firsts) - np.minimum.reduceat(rows[:, 2], firsts)
-        spots = turns > (_LEAST_NOISY_SPOT_TURN if tolerance > 0.0 else _LEAST_SPOT_TURN)
+        steps = np.concatenate([[0.0], np.hypot(*np.diff(rows[:, :2], axis=0).T)])
+        steps[firsts] = 0.0  # they lead from place to place
+        least = np.maximum(_LEAST_SPOT_TURN, _SPOT * np.add.reduceat(steps, firsts))
+        spots = turns > (_LEAST_NOISY_SPOT_TURN if tolerance > 0.0 else least)
     merged = int((ends - firsts - 1)[~spots].sum())
     notes = [f"{merged} waypoint{' repeats' if merged == 1 else 's repeat'} the place before"] if merged else []
     places, weights = rows[firsts], np.ones(len(firsts))
