@@ -198,6 +198,16 @@ def test_what_no_single_mistake_explains_is_refused_all_the_same(drives):
         check_recording(replace(recording, steering=0.0 * recording.steering), robot)
 
 
+def test_torques_in_another_unit_are_named_unless_strengths_are_asked_for(drives):
+    robot, recording = ROBOTS["chung2008"], drives["chung2008"]
+    wrong = replace(recording, torque=recording.torque * 1e3)
+    with pytest.raises(ContradictionError, match=r"write torque_roll_1 \[mN m\], .* into the header"):
+        check_recording(wrong, robot)
+    assert check_recording(wrong, robot, ("roll_strength",)) == ()
+    for name in ROBOTS:
+        assert check_recording(replace(drives[name], torque=2.0 * drives[name].torque), ROBOTS[name]) == ()
+
+
 def test_the_check_needs_neither_torch_nor_scipy():
     code = (
         "import sys, caster_gym.agents.identify, caster_gym.analysis.recording_check\n"

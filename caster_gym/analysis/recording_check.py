@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from caster_gym.analysis.acting import shown_errors
 from caster_gym.analysis.contradictions import SURE, Finding, hopeless_words, mend_words, size_words, small_words
 from caster_gym.analysis.kinematic_laws import Laws, Size, laws_of, rolling_ratios, window_of
-from caster_gym.analysis.log_faults import held_columns, torques_missing
+from caster_gym.analysis.log_faults import held_columns, torques_missing, torques_too_large
 from caster_gym.analysis.mends import Mend, mends, scaled_up, turned
 from caster_gym.analysis.recording import Recording
 from caster_gym.analysis.unknowns import robot_with
@@ -54,6 +54,8 @@ def check_recording(
         steering=recording.steering - errors[6:],
     )
     found = contradiction(as_true, believed)
+    if found is None and not any("strength" in name for name in (*names, *values)):
+        found = torques_too_large(recording, robot)
     if found is not None:
         raise ContradictionError(found.words + _ANYHOW)
     sizes = [size for size in different(as_true, believed) if not _is_asked(size.name, names)]
