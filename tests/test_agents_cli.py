@@ -63,6 +63,14 @@ def test_each_command_explains_itself(call, command):
         (["train", "--set", "steps"], "--set needs KEY=VALUE, got 'steps'"),
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (
+            ["train", "--set", "num_minibatches=4"],
+            "unknown key 'num_minibatches'; 'batch' is the size of a batch: robots · horizon over their number",
+        ),
+        (
+            ["train", "--set", "train_batch_size=4000"],
+            "unknown key 'train_batch_size'; robots · horizon steps come before each update",
+        ),
+        (
             ["identify", "drive.csv", "--set", "start={radius:0.0265}"],
             "--set start={radius:0.0265}: a colon needs a space after it, as in 'radius: 0.0265'",
         ),
@@ -323,6 +331,8 @@ def test_commands_try_their_folder_before_they_compute(call, tmp_path, monkeypat
     [
         (["robot.urdf"], "what is written is MJCF, for MuJoCo, got the name 'robot.urdf'; call it 'robot.xml'"),
         (["robot"], "call it 'robot.xml'"),
+        ([""], "got the name ''; call it 'robot.xml'"),
+        ([".."], "got the name '..'; call it 'robot.xml'"),
         (["robot.xml", "--time-step", "nan"], "time_step must be positive and finite, got nan s"),
         (["robot.xml", "--time-step", "inf"], "time_step must be positive and finite, got inf s"),
         (["robot.xml", "--time-step", "-0.1"], "time_step must be positive and finite, got -0.1 s"),
