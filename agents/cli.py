@@ -279,7 +279,7 @@ def export(
         from caster_gym.robot import load_robot
 
         if mjcf.suffix.lower() not in MJCF_SUFFIXES:
-            better = mjcf.with_suffix(".xml").name
+            better = f"{mjcf.stem.strip('.') or 'robot'}.xml"
             raise ValueError(f"what is written is MJCF, for MuJoCo, got the name {mjcf.name!r}; call it {better!r}")
         text = model(load_robot(robot), time_step, friction)
         check_file(mjcf, overwrite, "--mjcf")

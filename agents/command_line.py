@@ -1,6 +1,6 @@
 """What all commands of caster-gym share: options, settings of the form KEY=VALUE, and errors in one sentence."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -13,6 +13,7 @@ from caster_gym.configuration import parse_yaml
 
 NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
+MOST_THREADS = 1024  # far more make systems refuse memory that is there
 LONGEST_MESSAGE = 1000  # characters
 
 Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
@@ -24,7 +25,11 @@ Changes = Annotated[
 TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
 Threads = Annotated[
     int,
-    typer.Option(min=1, help="Threads of each process, for networks and simulation; results depend on their number."),
+    typer.Option(
+        min=1,
+        max=MOST_THREADS,
+        help="Threads of each process, for networks and simulation; results depend on their number.",
+    ),
 ]
 
 
@@ -36,7 +41,17 @@ def changes_of(options: list[str] | None) -> dict[str, Any]:
         if not equals or not key:
             raise ValueError(f"--set needs KEY=VALUE, got {option!r}")
         parsed[key] = parse_yaml(value, f"--set {option}")
+        _check_colons(parsed[key], option)
     return parsed
+
+
+def _check_colons(value: object, option: str) -> None:
+    """Refuse a mapping such as {radius:0.02}, which YAML takes for a key without a value."""
+    for key, inner in value.items() if isinstance(value, Mapping) else ():
+        if inner is None and isinstance(key, str) and ":" in key:
+            name, _, rest = key.partition(":")
+            raise ValueError(f"--set {option}: a colon needs a space after it, as in '{name}: {rest}'")
+        _check_colons(inner, option)
 
 
 def files_among(*names: object) -> tuple[Path, ...]:

@@ -61,6 +61,8 @@ _ON_POLICY = {
     "log_std_init": "initial_log_std",
     "num_mini_batches": "'batch' is the size of a batch: robots · horizon over their number",
     "n_minibatches": "'batch' is the size of a batch: robots · horizon over their number",
+    "num_minibatches": "'batch' is the size of a batch: robots · horizon over their number",
+    "train_batch_size": "robots · horizon steps come before each update",
     "value_loss_coef": _NO_CRITIC_WEIGHT["vf_coef"],
     "max_grad_norm": "gradients are shortened to a norm of 0.5, as is usual, which cannot be set",
     "target_kl": "updates are never cut short; 'epochs' and 'learning_rate' say how far they go",

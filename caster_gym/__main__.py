@@ -16,7 +16,12 @@ def main() -> None:
             print(f"caster_gym {caster_gym.__version__}")
             return
         sys.exit(_refuse(missing))
-    import_module("caster_gym.agents.cli").app(prog_name="caster-gym")
+    try:
+        app = import_module("caster_gym.agents.cli").app
+    except KeyboardInterrupt:  # afterwards each command says what is left
+        print("caster-gym: interrupted; nothing was written", file=sys.stderr)
+        sys.exit(130)
+    app(prog_name="caster-gym")
 
 
 def _refuse(missing: list[str]) -> int:

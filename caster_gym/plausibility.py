@@ -43,7 +43,7 @@ def warn_if_implausible(robot: "Robot") -> None:
 
 
 def _sentence(doubt: _Doubt) -> str:
-    return f"{doubt.field!r} is {doubt.value:g} {doubt.unit}, {doubt.usual}"
+    return f"{doubt.field!r} is {doubt.value:g}{doubt.unit and ' '}{doubt.unit}, {doubt.usual}"
 
 
 def _outside(field: str, value: float, unit: str, low: float, high: float, usual: str) -> Iterator[_Doubt]:
@@ -76,6 +76,17 @@ def _platform_doubts(robot: "Robot") -> Iterator[_Doubt]:
     )
     away = float((platform.com[0] ** 2 + platform.com[1] ** 2) ** 0.5)
     yield from _outside("platform.com", away, "m from C", 0.0, reach, f"outside of the outline of {reach:.2g} m")
+    if any(motor.coulomb > 0.0 for caster in robot.casters for motor in (caster.roll, caster.steer)):
+        slowest = min(min(caster.roll.max_speed, caster.steer.max_speed) for caster in robot.casters)
+        yield from _outside(
+            "coulomb_speed",
+            robot.coulomb_speed,
+            "rad/s",
+            0.0,
+            0.5 * slowest,
+            f"where a motor turns at {slowest:g} rad/s at most, so that its dry friction hardly acts; usual are "
+            "0.005 … 0.1",
+        )
     yield from _outside("floor_friction", robot.floor_friction, "", 0.02, 5.0, "usual are 0.3 … 1.2")
 
 

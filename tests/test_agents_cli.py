@@ -62,6 +62,18 @@ def test_each_command_explains_itself(call, command):
         (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, track"),
         (["train", "--set", "steps"], "--set needs KEY=VALUE, got 'steps'"),
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
+        (
+            ["train", "--set", "num_minibatches=4"],
+            "unknown key 'num_minibatches'; 'batch' is the size of a batch: robots · horizon over their number",
+        ),
+        (
+            ["train", "--set", "train_batch_size=4000"],
+            "unknown key 'train_batch_size'; robots · horizon steps come before each update",
+        ),
+        (
+            ["identify", "drive.csv", "--set", "start={radius:0.0265}"],
+            "--set start={radius:0.0265}: a colon needs a space after it, as in 'radius: 0.0265'",
+        ),
         (["train", "--set", "stepz=3"], "did you mean 'steps'?"),
         (["train", "--set", "steps=many"], "should be a whole number, got 'many'"),
         (["train", "--set", "steps=["], "--set steps=[ cannot be read as YAML: expected the node content"),
@@ -319,6 +331,8 @@ def test_commands_try_their_folder_before_they_compute(call, tmp_path, monkeypat
     [
         (["robot.urdf"], "what is written is MJCF, for MuJoCo, got the name 'robot.urdf'; call it 'robot.xml'"),
         (["robot"], "call it 'robot.xml'"),
+        ([""], "got the name ''; call it 'robot.xml'"),
+        ([".."], "got the name '..'; call it 'robot.xml'"),
         (["robot.xml", "--time-step", "nan"], "time_step must be positive and finite, got nan s"),
         (["robot.xml", "--time-step", "inf"], "time_step must be positive and finite, got inf s"),
         (["robot.xml", "--time-step", "-0.1"], "time_step must be positive and finite, got -0.1 s"),
@@ -383,4 +397,5 @@ def test_threads_are_those_asked_for_and_in_run_yaml(call, tmp_path):
     assert call("evaluate", "computed_torque", *arguments, "results").exit_code == 0
     for folder in ("run", "results"):
         assert yaml.safe_load((tmp_path / folder / "run.yaml").read_text(encoding="utf-8"))["threads"] == 2
-    assert call("train", "--threads", "0").exit_code == 2
+    for threads in ("0", "100000"):
+        assert call("train", "--threads", threads).exit_code == 2

@@ -40,6 +40,13 @@ def swapped(recording, name):
     return replace(recording, **{name: getattr(recording, name)[:, order]})
 
 
+def rotated(recording):
+    """Casters that are counted from another one, in all of their columns."""
+    return replace(
+        recording, **{name: np.roll(getattr(recording, name), 1, axis=1) for name in ("steering", "rolling")}
+    )
+
+
 def in_the_world(recording):
     c, s = np.cos(recording.pose[:, 2]), np.sin(recording.pose[:, 2])
     vx, vy, omega = recording.twist.T
@@ -85,6 +92,13 @@ MISTAKES = {
     "time is in minutes": lambda r: replace(r, time_step=r.time_step / 60.0),
     "rolling_2 has the other sign": lambda r: flipped(r, "rolling", 1),
     "rolling_1 and rolling_2 are columns of other casters": lambda r: swapped(r, "rolling"),
+    "steering_1, steering_2.*rolling_1, rolling_2.*are columns of other casters": rotated,
+    "rolling_1, .* start again after each turn": lambda r: replace(r, rolling=np.mod(r.rolling, 2.0 * np.pi)),
+    "rolling_1, .* are 65[123].* times the wheels' angles": lambda r: replace(r, rolling=651.9 * r.rolling),
+    "rolling_1, .* are -4[78].* times the wheels' angles": lambda r: replace(r, rolling=-48.0 * r.rolling),
+    "rolling_2 is 4[78].* times the wheels' angles": lambda r: replace(
+        r, rolling=r.rolling * np.where(np.arange(r.rolling.shape[1]) == 1, 48.0, 1.0)
+    ),
     "are in turns": lambda r: replace(r, rolling=r.rolling / (2.0 * np.pi)),
     "rolling.* are in degrees": lambda r: replace(r, rolling=r.rolling / DEGREE),
     "are rates in rad/s": lambda r: replace(r, rolling=np.gradient(r.rolling, r.time_step, axis=0)),
@@ -182,6 +196,16 @@ def test_what_no_single_mistake_explains_is_refused_all_the_same(drives):
     robot, recording = ROBOTS["chung2008"], drives["chung2008"]
     with pytest.raises(ContradictionError, match=r"explains it\. steering_1, steering_2 and steering_3 never change"):
         check_recording(replace(recording, steering=0.0 * recording.steering), robot)
+
+
+def test_torques_in_another_unit_are_named_unless_strengths_are_asked_for(drives):
+    robot, recording = ROBOTS["chung2008"], drives["chung2008"]
+    wrong = replace(recording, torque=recording.torque * 1e3)
+    with pytest.raises(ContradictionError, match=r"write torque_roll_1 \[mN m\], .* into the header"):
+        check_recording(wrong, robot)
+    assert check_recording(wrong, robot, ("roll_strength",)) == ()
+    for name in ROBOTS:
+        assert check_recording(replace(drives[name], torque=2.0 * drives[name].torque), ROBOTS[name]) == ()
 
 
 def test_the_check_needs_neither_torch_nor_scipy():

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from caster_gym.__main__ import main
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = PROJECT["tool"]["setuptools"]["packages"]
@@ -147,6 +149,17 @@ def test_the_package_runs_as_the_command(installed, tmp_path):
     assert python(code, installed, tmp_path).startswith("Usage: caster-gym ")
     module, function = PROJECT["project"]["scripts"]["caster-gym"].split(":")
     assert (module, function) == ("caster_gym.__main__", "main")
+
+
+def test_an_interrupt_while_the_command_loads_ends_it_quietly(monkeypatch, capsys):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("caster_gym.__main__.import_module", interrupted)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "caster-gym: interrupted; nothing was written\n"
 
 
 def test_dir_shows_the_public_names(installed, tmp_path):

@@ -45,6 +45,10 @@ def in_millimetres(robot):
 
 
 ODD = {
+    "dry friction that hardly acts": (
+        lambda robot: robot.update(coulomb_speed=30.0),
+        ["'coulomb_speed' is 30 rad/s, where a motor turns at 40 rad/s at most"],
+    ),
     "radius in millimetres": (every(radius=50.8), ["casters 1, 2, 3, 4: 'radius' is 50.8 m", "0.34 m from C"]),
     "trail in millimetres": (every(trail=14.0), ["'trail' is 14 m"]),
     "trail larger than the platform": (every(trail=0.4), ["'trail' is 0.4 m", "0.05 … 0.3"]),

@@ -307,3 +307,21 @@ def test_a_copy_draws_what_the_original_draws(copied):
     assert_array_equal(other.show(last), frame)
     other.show([scene(3.0, 0.0, time=7.0), scene(0.0, 0.0, time=7.0)])
     assert_array_equal(original.show(last), frame)
+
+
+def test_an_old_pygame_that_imports_a_deprecated_package_loads_without_a_warning(tmp_path):
+    (tmp_path / "pygame.py").write_text(
+        "import warnings\n"
+        "warnings.warn('pkg_resources is deprecated as an API. See its page', DeprecationWarning, stacklevel=2)\n",
+        encoding="utf-8",
+    )
+    code = "import caster_gym.render.pygame_loader as loader; print(loader.pygame.__file__)"
+    places = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    found = subprocess.run(
+        [sys.executable, "-W", "error::DeprecationWarning", "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": places},
+    )
+    assert found.stdout.strip() == str(tmp_path / "pygame.py")

@@ -33,6 +33,7 @@ _MORE = 2.5  # times what noise leaves, from which a law is broken
 _SMALL = 1e-3  # [-] that is left of a law, below which it is not broken
 _INTEGRATION = 1e-5  # [-] of a law's own size, squared: what samples far apart leave of it
 _NOTHING_IN_COMMON = 0.5  # [-] of both sides of a law that is left, from which it tells no size
+_ALIKE = 0.9  # [-] squared correlation from which angles go with ways
 _TOO_FAST = 3.0  # times the top speed
 _ROWS_FOR_NOISE = 1000
 _ASIDE = 1e-3  # [-] of its way by which a wheel may seem to go aside
@@ -199,16 +200,40 @@ def _rolling(parts: _Parts, robot: Robot, zeros: Array) -> tuple[list[Law], list
     angles = parts.recording.rolling
     if angles is None:
         return [], []
-    rolled, laws, sizes = parts.summed(np.diff(angles, axis=0)), [], []
+    rolled, ways, laws, sizes = parts.summed(np.diff(angles, axis=0)), _ways(parts, robot, zeros), [], []
     for i, caster in enumerate(robot.casters):
-        left, r = rolled[:, i], caster.radius
-        way = math.cos(zeros[i]) * parts.along[:, i] - math.sin(zeros[i]) * parts.across[:, i]
-        way = way - caster.offset * parts.turned[:, i]
+        left, way, r = rolled[:, i], ways[:, i], caster.radius
         noise = parts.path_noise[:, i] + 2.0 * r**2 * white_noise(angles[:, i : i + 1]) ** 2
         law, radius, deviation = _scaled_law((f"rolling_{i + 1}",), way, left, r, noise)
         laws.append(law)
         sizes.append(Size(f"radius_{i + 1}", r, radius, deviation))
     return laws, sizes
+
+
+def _ways(parts: _Parts, robot: Robot, zeros: Array) -> Array:
+    """Ways (W, N) of the wheels along their rolling directions, in windows. [m]"""
+    offsets = np.array([caster.offset for caster in robot.casters])
+    return np.asarray(np.cos(zeros) * parts.along - np.sin(zeros) * parts.across - offsets * parts.turned, np.float64)
+
+
+def rolling_ratios(recording: Recording, robot: Robot, width: int) -> dict[int, float]:
+    """How many times larger, by caster (from 0), rolling angles are than the ways of wheels make them.
+
+    Only of casters whose angles go with their ways, and by more than a radius may be off.
+    """
+    if recording.rolling is None:
+        return {}
+    parts = _Parts(recording, robot, width)
+    ways, rolled = _ways(parts, robot, np.zeros(robot.caster_count)), parts.summed(np.diff(recording.rolling, axis=0))
+    ratios: dict[int, float] = {}
+    for i, caster in enumerate(robot.casters):
+        way, angle = ways[:, i] / caster.radius, rolled[:, i]
+        both, sizes = float(way @ angle), float((way @ way) * (angle @ angle))
+        if both**2 > _ALIKE * sizes > 0.0:
+            ratio = math.copysign(math.sqrt(float(angle @ angle) / float(way @ way)), both)
+            if not 1.0 / _WIDEST < abs(ratio) < _WIDEST:
+                ratios[i] = ratio
+    return ratios
 
 
 def _scaled_law(

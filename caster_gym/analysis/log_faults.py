@@ -10,12 +10,15 @@ from caster_gym.analysis.contradictions import Finding, columns_of
 from caster_gym.analysis.kinematic_laws import white_noise
 from caster_gym.analysis.mends import Mend, listed
 from caster_gym.analysis.recording import Recording
+from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
 
 _FEWEST_CHANGES = 5
 _HELD = 0.8  # [-] of a column's changes that come at one and the same interval
 _WINDOWS_OF_SPEED = 50
+_MOSTLY = 0.9  # [-] quantile of torques that stands for the greatest, without outliers
+_BEYOND_LIMITS = 5.0  # times the greatest torque of a motor
 _SURE = 10.0  # standard deviations of noise that a speed must gain
 
 
@@ -83,6 +86,23 @@ def torques_missing(recording: Recording) -> Finding | None:
         f"All torques are zero, though the robot speeds up from {speeds[: last + 1].min():.3g} to {speeds[last]:.3g} "
         "m/s: whatever wrote the recording did not know them. Write the torques of the motors, such as their currents "
         "times their torque constants.",
+        None,
+    )
+
+
+def torques_too_large(recording: Recording, robot: Robot) -> Finding | None:
+    """Torques far beyond what motors give: a log in another unit, or of currents."""
+    limits = [getattr(caster, kind).max_torque for caster in robot.casters for kind in ("roll", "steer")]
+    names = [f"torque_{kind}_{i + 1}" for i in range(robot.caster_count) for kind in ("roll", "steer")]
+    shares = np.quantile(np.abs(recording.torque), _MOSTLY, axis=0) / np.array(limits)  # (2 N,)
+    if shares.max() <= _BEYOND_LIMITS:
+        return None
+    worst = int(shares.argmax())
+    large = listed(f"{name} [mN m]" for name, share in zip(names, shares, strict=True) if share > _BEYOND_LIMITS)
+    return Finding(
+        f"{names[worst]} reaches {shares[worst] * limits[worst]:.3g} N m, where its motor has {limits[worst]:g} N m at "
+        f"most. If it is in mN m, write {large} into the header; if it is a current, multiply it by the torque "
+        "constant; if the motor is stronger, say so in the robot's file.",
         None,
     )
 

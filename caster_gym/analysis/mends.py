@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 _DEGREE = math.pi / 180.0
 _LONGEST_SHIFT = 10  # samples
 _SMALLER = {1e2: "cm", 1e3: "mm"}
+_ONE_TURN = 2.0 * math.pi + 0.1  # [rad] and some noise
+_ONE_RATIO = 0.02  # [-] by which ratios of casters differ that are one
+_TORQUES_TOO = " (the torques with them, if those are in the same order)"
 _ALL_ORDERS = 4  # casters, beyond which columns are only swapped in pairs
 
 
@@ -36,6 +39,7 @@ def mends(recording: Recording, robot: Robot) -> Iterator[Mend]:
     for name in ("steering", "rolling"):
         if getattr(recording, name) is not None:
             yield from _columns(name, robot.caster_count)
+    yield from _whole_casters(recording)
     yield from _rolling_units(recording, robot)
     yield from _twists(recording)
     yield from _times()
@@ -128,8 +132,7 @@ def _columns(name: str, count: int) -> Iterator[Mend]:
         moved = [(i, j) for i, j in enumerate(order) if i != j]
         yield Mend(
             f"{listed(f'{name}_{i + 1}' for i, _ in moved)} are columns of other casters",
-            "call " + listed(f"{name}_{j + 1} {name}_{i + 1}" for i, j in moved) + " (the torques with them, if "
-            "those are in the same order)",
+            "call " + listed(f"{name}_{j + 1} {name}_{i + 1}" for i, j in moved) + _TORQUES_TOO,
             lambda r, order=list(order): replace(r, **{name: getattr(r, name)[:, order]}),  # type: ignore[misc]
             name,
         )
@@ -139,6 +142,27 @@ def _columns(name: str, count: int) -> Iterator[Mend]:
         yield turned(dict.fromkeys(everyone, degrees * _DEGREE))
         for i in everyone:
             yield turned({i: degrees * _DEGREE})
+
+
+def _whole_casters(recording: Recording) -> Iterator[Mend]:
+    """Casters that are counted in another order, in all of their columns."""
+    if recording.rolling is None:
+        return
+    names = ("steering", "rolling")
+    count = recording.steering.shape[1]
+    ring = list(range(count))
+    turns = [tuple(some[i:] + some[:i]) for some in (ring, ring[::-1]) for i in ring]
+    pairs = (order for order in _orders(count) if sum(i != j for i, j in enumerate(order)) == 2)
+    for order in dict.fromkeys((*pairs, *turns)):  # the other way round, or from another caster on
+        moved = [(i, j) for i, j in enumerate(order) if i != j]
+        if not moved:
+            continue
+        yield Mend(
+            f"{listed(f'{name}_{i + 1}' for name in names for i, _ in moved)} are columns of other casters",
+            "call " + listed(f"{name}_{j + 1} {name}_{i + 1}" for name in names for i, j in moved) + _TORQUES_TOO,
+            lambda r, order=list(order): replace(r, **{name: getattr(r, name)[:, order] for name in names}),  # type: ignore[misc]
+            "steering",
+        )
 
 
 def _orders(count: int) -> Iterator[tuple[int, ...]]:
@@ -173,6 +197,30 @@ def _rolling_units(recording: Recording, robot: Robot) -> Iterator[Mend]:
         f"{columns} are rates in rad/s, not angles",
         f"write the sum of rate times time step into {columns}",
         lambda r: replace(r, rolling=_summed(r.rolling, r.time_step)),
+        "rolling",
+    )
+
+    if float(np.ptp(recording.rolling, axis=0).max()) <= _ONE_TURN:
+        yield Mend(
+            f"{columns} start again after each turn, as encoders of a single turn do",
+            f"add 2 pi to {columns}, or subtract it, from each jump on, as numpy.unwrap does",
+            lambda r: replace(r, rolling=None if r.rolling is None else np.unwrap(r.rolling, axis=0)),
+            "rolling",
+        )
+
+
+def scaled_up(ratios: dict[int, float]) -> Mend:
+    """Rolling angles of casters (from 0) that are so many times too large."""
+    columns, values = [f"rolling_{i + 1}" for i in ratios], list(ratios.values())
+    middle = sorted(values)[len(values) // 2]
+    if all(abs(value / middle - 1.0) < _ONE_RATIO for value in values):
+        values, ratios = [middle], dict.fromkeys(ratios, middle)
+    sizes, factors = ([f"{value:.4g}" for value in some] for some in (values, [1.0 / value for value in values]))
+    return Mend(
+        f"{listed(columns)} {_are(columns)} {listed(sizes)} times the wheels' angles in radians, such as the counts of "
+        "an encoder or the angle of a motor before its gears",
+        f"multiply {listed(columns)} by {listed(factors)}",
+        lambda r: _scaled(r, "rolling", {i: 1.0 / ratio for i, ratio in ratios.items()}),
         "rolling",
     )
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from caster_gym.analysis.acting import shown_errors
 from caster_gym.analysis.contradictions import SURE, Finding, hopeless_words, mend_words, size_words, small_words
-from caster_gym.analysis.kinematic_laws import Laws, Size, laws_of, window_of
-from caster_gym.analysis.log_faults import held_columns, torques_missing
-from caster_gym.analysis.mends import Mend, mends, turned
+from caster_gym.analysis.kinematic_laws import Laws, Size, laws_of, rolling_ratios, window_of
+from caster_gym.analysis.log_faults import held_columns, torques_missing, torques_too_large
+from caster_gym.analysis.mends import Mend, mends, scaled_up, turned
 from caster_gym.analysis.recording import Recording
 from caster_gym.analysis.unknowns import robot_with
 from caster_gym.robot import Robot
@@ -28,6 +28,7 @@ _FACTOR = 3.2  # by which a mend must lessen what is left of all laws together
 _HOPELESS = 0.5  # [-] of both sides of a law that is left where columns have little in common
 _APART = 0.02  # [-] of a trail or a radius, from which estimates would be wrong too
 _ASKEW = 0.5 * math.pi / 180.0  # [rad] of a steering zero, the same
+_ODD_UNIT = 0.1  # [-] for each column, by which a unit of its own must fit better than one that is known
 _WHOLE_TURN = 0.6  # [rad] of a steering zero that is a convention and not an error
 
 _ANYHOW = " To fit the recording as it is, --set check=false."
@@ -53,6 +54,8 @@ def check_recording(
         steering=recording.steering - errors[6:],
     )
     found = contradiction(as_true, believed)
+    if found is None and not any("strength" in name for name in (*names, *values)):
+        found = torques_too_large(recording, robot)
     if found is not None:
         raise ContradictionError(found.words + _ANYHOW)
     sizes = [size for size in different(as_true, believed) if not _is_asked(size.name, names)]
@@ -82,18 +85,27 @@ def contradiction(recording: Recording, robot: Robot) -> Finding | None:
         return None
     part = _liveliest(recording, robot)
     before = laws_of(part, robot, width)
-    best: tuple[Mend, Laws] | None = None
     suspects = _suspects(laws)
-    for mend in (*_own_zeros(before), *mends(part, robot)):
-        if mend.of not in suspects:
-            continue
-        after = laws_of(mend.mended(part), robot, width)
-        if not _is_worse(before, after) and (best is None or after.cost < best[1].cost):
-            best = mend, after
+    known = [mend for mend in (*_own_zeros(before), *mends(part, robot)) if mend.of in suspects]
+    ratios = rolling_ratios(part, robot, width) if "rolling" in suspects else {}
+    best = _best(known, part, robot, before, width)
+    own = _best([scaled_up(ratios)] if ratios else [], part, robot, before, width)
+    if own is not None and (best is None or own[1].cost < best[1].cost - _ODD_UNIT * len(ratios)):
+        best = own
     if best is not None and before.cost - best[1].cost > 2.0 * math.log(_FACTOR):
         return Finding(mend_words(before, *best), best[0])
     hopeless = [law for law in laws.laws if law.broken and law.misfit > _HOPELESS]
     return Finding(hopeless_words(hopeless, recording), None) if hopeless else None
+
+
+def _best(known: Sequence[Mend], part: Recording, robot: Robot, before: Laws, width: int) -> tuple[Mend, Laws] | None:
+    """The mistake whose mend leaves least of all laws."""
+    best: tuple[Mend, Laws] | None = None
+    for mend in known:
+        after = laws_of(mend.mended(part), robot, width)
+        if not _is_worse(before, after) and (best is None or after.cost < best[1].cost):
+            best = mend, after
+    return best
 
 
 def _suspects(laws: Laws) -> set[str]:
