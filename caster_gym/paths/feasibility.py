@@ -27,6 +27,8 @@ from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
+_FACTORS = tuple(2.0**power for power in range(1, 9))  # by which a path is walked slower
+_PRECISION = 1.02  # [-] of the factor that is found
 _BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
 
 
@@ -45,6 +47,8 @@ class MotorUse:
 class Easable(Protocol):
     """A path that knows slower versions of itself."""
 
+    @property
+    def duration(self) -> float: ...
     @property
     def remedy(self) -> str: ...
     def eased(self, factor: float) -> Self: ...
@@ -77,8 +81,7 @@ def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Rob
     k = int(hardest.use.argmax())
     if hardest.use[k] <= 1.0:
         return
-    gentler = _gentler(path, trajectories[k].time_step, robot)
-    remedy = f"{gentler.remedy} would do" if gentler is not None else "going slower does not help"
+    remedy = _remedy(path, trajectories[k].time_step, robot)
     raise ValueError(f"path {trajectories[k].name!r} {_complaint(hardest, k, robot)}; {remedy}")
 
 
@@ -95,20 +98,27 @@ def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
     return f"asks {torque:.2g} N m of {joint} {when}, where its motor has {hardest.left[k]:.2g} N m left"
 
 
-def _gentler(path: Easable, time_step: float, robot: Robot) -> Easable | None:
-    """The path eased by little more than it must be, or None if a factor of 64 is not enough."""
+def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
+    """What going slower does: by little more than the path must, if it may last as long as that."""
 
-    def does(factor: float) -> bool:
-        return bool((motor_use(path.eased(factor).trajectories(time_step), robot).use <= 1.0).all())
+    def does(factor: float, whole: bool = False) -> bool:
+        slower = path.eased(factor)
+        step = time_step if whole else time_step * slower.duration / path.duration  # as many samples are quicker
+        return bool((motor_use(slower.trajectories(step), robot).use <= 1.0).all())
 
-    high = next((factor for factor in (2.0, 4.0, 8.0, 16.0, 32.0, 64.0) if does(factor)), None)
+    high = next((factor for factor in _FACTORS if does(factor)), None)
     if high is None:
-        return None
+        return f"going slower does not help, not even {_FACTORS[-1]:g} times"
     low = max(1.0, 0.5 * high)
-    while high > 1.02 * low:
+    while high > _PRECISION * low:
         middle = (low * high) ** 0.5
         low, high = (low, middle) if does(middle) else (middle, high)
-    return path.eased(high)
+    try:
+        while not does(high, whole=True):  # more samples may see a little more
+            high *= _PRECISION
+    except ValueError:
+        return f"it must be driven {high:.3g} times as slowly, which takes more time steps than a path may have"
+    return f"{path.eased(high).remedy} would do"
 
 
 def _hardest(samples: Array, psi: Plane, time_step: float, robot: RobotParameters) -> tuple[Array, ...]:
