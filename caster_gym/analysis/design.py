@@ -20,7 +20,7 @@ from caster_gym.analysis.envelope import Motions, envelope_loads, joined, path_l
 from caster_gym.analysis.isotropy import global_isotropies
 from caster_gym.analysis.sizing import driven_motors, harder_motions, motor_shares, motor_uses, trajectories_of
 from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
-from caster_gym.paths.trajectory import Trajectory
+from caster_gym.paths.trajectory import Trajectory, rounded_down
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -73,10 +73,10 @@ class Region(NamedTuple):
         room = wheel_room(robot)
         least = target.radius[0] + target.trail[0]
         if least >= room:
+            together = f"together must stay below {rounded_down(room, 4):g} m" if room > 0.0 else "have no room at all"
             raise ValueError(
                 f"wheels of radius {target.radius[0]:g} m and trail {target.trail[0]:g} m, the least that the bounds "
-                f"allow, could touch those of another caster of robot {robot.name!r}: radius and trail together must "
-                f"stay below {room:.4g} m"
+                f"allow, could touch those of another caster of robot {robot.name!r}: radius and trail {together}"
             )
         return cls((target.radius[0], min(target.radius[1], room - target.trail[0])), target.trail, room)
 
