@@ -1,5 +1,6 @@
 """caster_gym.analysis.design: optima against dense grids, the rule of scaling, room for wheels, targets refused."""
 
+import re
 from itertools import combinations
 
 import numpy as np
@@ -236,6 +237,21 @@ def test_bounds_within_which_wheels_always_touch_are_refused():
     target = DesignTarget(**{**LIMITS, **BOUNDS, "trail": (0.08, 0.1)})
     with pytest.raises(ValueError, match=r"could touch those of another caster of robot 'chung2008'.*below 0.0865 m"):
         optimise(ROBOT, target)
+
+
+def test_wheels_within_the_room_that_a_message_names_do_not_touch():
+    with pytest.raises(ValueError, match="must stay below") as error:
+        Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (0.08, 0.1)}))
+    room = float(re.search(r"below ([\d.]+) m", str(error.value))[1])
+    least = BOUNDS["radius"][0]
+    assert Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (room - least - 1e-9, 0.1)}))
+
+
+def test_casters_at_one_place_are_told_that_no_wheels_have_room():
+    first, *others = ROBOT.casters
+    one_place = ROBOT.model_copy(update={"casters": (first, first, *others)})
+    with pytest.raises(ValueError, match="radius and trail have no room at all"):
+        Region.of(one_place, EVEN)
 
 
 def test_casters_that_differ_are_refused():

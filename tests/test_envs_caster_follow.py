@@ -263,7 +263,7 @@ def pillar(x, y, radius=0.1):
             {"path": {"shape": "random_paths", "count": 3, "seed": 1, "reversing": 1.0}},
             r"path 'random_paths.*' makes no course: it turns back on the spot at s = .* m, \(x, y\) = \(",
         ),
-        ({"path": {"shape": "circle", "radius": 0.01}}, "path 'circle' makes no course: it is 0.0628 m long"),
+        ({"path": {"shape": "circle", "radius": 1e-3}}, "path 'circle' makes no course: its tangent turns"),
         ({"path": "circel"}, "'circel'; did you mean 'circle'"),
         ({"control_period": 0.1}, r"time step of 0\.025 s cannot follow"),
     ],
@@ -299,3 +299,11 @@ def _started():
     env = CasterFollowEnv(path=CIRCLE)
     env.reset(seed=0)
     return env
+
+
+@pytest.mark.parametrize("fields", [{"window": 0.03}, {"speed_limit": 1 / 3, "control_period": 0.013, "window": 1e-3}])
+def test_the_window_that_a_message_names_is_wide_enough(fields):
+    with pytest.raises(ValueError, match="must be at least") as error:
+        FollowTask(**fields)
+    least = float(re.search(r"at least ([\d.]+) m", str(error.value))[1])
+    assert FollowTask(**{**fields, "window": least})
