@@ -56,7 +56,7 @@ def test_a_wrong_target_is_refused_by_a_sentence_that_names_the_key(change, word
 
 def test_driven_joints_that_are_singular_somewhere_are_refused():
     robot = load_robot("chung2008")
-    with pytest.raises(ValueError, match="; drive roll_1, steer_1, roll_2, steer_2$"):
+    with pytest.raises(ValueError, match=r"; drive roll_1, steer_1, roll_2, steer_2$"):
         check_actuation(robot.with_actuation(["roll_1", "roll_2", "roll_3"]))
     with pytest.raises(ValueError, match=r"three joints or more of robot 'chung2008', got roll_1, steer_1"):
         check_actuation(robot.with_actuation(["roll_1", "steer_1"]))

@@ -1,6 +1,7 @@
 """caster_gym.envs.starts: a start that is given is the one that is had, alone, in a batch and in Torch."""
 
 import re
+
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -79,6 +79,7 @@ def test_a_tum_file_has_no_header(tmp_path):
             "line 2: .* got 4 cells: '0,0,0,0'; if these are decimal commas, write decimal points",
         ),
         (b"x,y\n\xff\xfe\n", "cannot be read as CSV: .*; save it as UTF-8"),
+        ("x,y\n1,2\n".encode("utf-16-be"), "cannot be read as CSV: it has bytes of zero.*; save it as UTF-8"),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_what_to_change(tmp_path, text, message):

@@ -206,7 +206,7 @@ def optimise(robot: Robot, target: DesignTarget, report: Callable[[float], None]
     if not np.isfinite(costs).any():
         raise ValueError(
             f"no design within the bounds reaches the target: motors of robot {robot.name!r} turn faster than their "
-            f"top speeds, with a margin of {target.margin:g}; larger wheels, longer trails or faster motors would do"
+            f"top speeds, with a margin of {target.margin:g}{_fast_enough(able, target, region)}"
         )
     starts = _local_optima(costs)[:_STARTS]
     place, total = places[starts[0]], len(starts) + _EXCHANGES
@@ -246,6 +246,24 @@ def optimise(robot: Robot, target: DesignTarget, report: Callable[[float], None]
         grid=(*region.design(places), search.sign * costs),
         motions=search.motions,
     )
+
+
+def _fast_enough(robot: Robot, target: DesignTarget, region: Region) -> str:
+    """How much faster motors must be for a design at a corner of the region to reach the target, as advice."""
+    for factor in (1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0):
+        casters = tuple(
+            caster.model_copy(
+                update={
+                    name: motor.model_copy(update={"max_speed": factor * motor.max_speed})
+                    for name, motor in (("roll", caster.roll), ("steer", caster.steer))
+                }
+            )
+            for caster in robot.casters
+        )
+        search = _Search(robot.model_copy(update={"casters": casters}), target, region)
+        if np.isfinite(search.costs(np.array(_TYPICAL[1:]))).any():
+            return f"; motors {factor:g} times as fast would do"
+    return ""
 
 
 def _around(radius: float, trail: float) -> tuple[tuple[str, float, float], ...]:
