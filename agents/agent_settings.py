@@ -44,9 +44,10 @@ class OnPolicy(Learner):
     @model_validator(mode="after")
     def _batches_fit(self) -> Self:
         if self.batch > self.robots * self.horizon:
+            smaller = "make it smaller, or " if self.robots * self.horizon > 1 else ""
             raise ValueError(
                 f"'batch' must be at most robots · horizon = {self.robots * self.horizon} steps, got {self.batch}: "
-                "make it smaller, or take more robots or a longer horizon"
+                f"{smaller}take more robots or a longer horizon"
             )
         return self
 
@@ -75,10 +76,11 @@ class RslPPOSettings(OnPolicy, OnTensors):
     def _batches_are_whole(self) -> Self:
         if self.robots * self.horizon % self.batch:
             whole = self.robots * self.horizon
-            fitting = next(size for size in range(self.batch, 0, -1) if whole % size == 0)
+            smaller = next((size for size in range(self.batch, 1, -1) if whole % size == 0), None)
+            larger = next(size for size in range(self.batch, whole + 1) if whole % size == 0)
+            nearest = f"smaller one that does is {smaller}" if smaller else f"larger one that does is {larger}"
             raise ValueError(
-                f"'batch' must divide robots · horizon = {whole} steps, got {self.batch}: the next smaller one "
-                f"that does is {fitting}"
+                f"'batch' must divide robots · horizon = {whole} steps, got {self.batch}: the next {nearest}"
             )
         return self
 
@@ -118,7 +120,7 @@ class SACSettings(Learner):
 
     usual_names: ClassVar[Mapping[str, str]] = usual.SAC
     algorithm: Literal["sac"]
-    steps: PositiveInt = 500_000
+    steps: Annotated[int, Field(ge=2)] = 500_000  # some random, and then some of learning
     learning_rate: PositiveFloat = 1e-3
     robots: PositiveInt = 32
     batch: PositiveInt = 256

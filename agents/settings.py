@@ -10,10 +10,12 @@ from pydantic import (
     Field,
     PositiveFloat,
     PositiveInt,
+    ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
+from pydantic_core import InitErrorDetails
 
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
@@ -59,6 +61,12 @@ class ChosenTask(Frozen):
                     raise ValueError(
                         f"{misplaced[0]!r} is for environment {other!r}, got it with environment {environment!r}"
                     )
+            if unknown := [key for key in task if key not in kind.model_fields]:  # refused for this kind of task alone
+                problems = [
+                    InitErrorDetails(type="extra_forbidden", loc=(kind.__name__, str(key)), input=task[key])
+                    for key in unknown
+                ]
+                raise ValidationError.from_exception_data(kind.__name__, problems)
             return kind.model_validate(task)
         if isinstance(task, Task) and not isinstance(task, kind):
             raise ValueError(f"must be a {kind.__name__} in environment {environment!r}, got a {type(task).__name__}")

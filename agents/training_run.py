@@ -80,7 +80,7 @@ class Run:
         self._diverged = True
         rate = self.settings.learning_rate
         raise ValueError(
-            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}: a smaller one helps"
+            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}; try a smaller one"
         ) from cause
 
     def validate(self, actor: Actor) -> None:

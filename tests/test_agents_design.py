@@ -135,7 +135,7 @@ def test_wrong_settings_are_refused_by_a_sentence_that_names_them(target, change
     [
         ("nope", {}, "unknown robot 'nope'"),
         (None, {"actuation": ["roll_1", "roll_2", "roll_9"]}, "unknown joint 'roll_9'"),
-        (None, {"actuation": ["roll_1", "roll_2", "roll_3"]}, "drive both joints of two casters"),
+        (None, {"actuation": ["roll_1", "roll_2", "roll_3"]}, "; drive roll_1, steer_1, roll_2, steer_2$"),
         (None, {"trail": [0.08, 0.1]}, "could touch"),
         (None, {"radius": [1e-4, 2e-4]}, "too uneven"),
     ],

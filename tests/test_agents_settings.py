@@ -168,6 +168,7 @@ def test_an_environment_has_tasks_of_its_own():
             "must be a FollowTask in environment 'follow', got a TrackTask",
         ),
         ({"environment": "follow", "task": {"speed_limt": 1.0}}, r"'task\.speed_limt'; did you mean 'speed_limit'\?"),
+        ({"task": {"margn": 0.5}}, r"unknown key 'task\.margn'; known are (?!.*margin)"),  # a key of the other task
         ({"environment": "follow", "task": {"speed_limit": 0}}, r"'task\.speed_limit' should be greater than 0, got 0"),
         ({"arena": {"beside": {"pillar": 3}}}, r"'arena\.beside\.pillar'; did you mean 'pillars'\?"),
         ({"arena": "nowhere.yaml"}, "'arena': there is no file 'nowhere.yaml'"),
@@ -216,6 +217,8 @@ def test_a_path_is_taken_as_it_is(tmp_path):
         ("ppo", {"robots": 4}, {"robots": 16}),
         ("ppo", {"robots": 4}, {"robots": 4, "horizon": 512}),
         ("ppo_gpu", {"batch": 1000}, {"batch": 512}),
+        ("ppo_gpu", {"robots": 1, "horizon": 127, "batch": 2}, {"robots": 1, "horizon": 127, "batch": 127}),
+        ("ppo", {"robots": 1, "horizon": 1}, {"robots": 2048, "horizon": 1}),
         ("shac", {"robots": 8}, {"robots": 8, "critic_batch": 128}),
         ("shac", {"robots": 8}, {"robots": 8, "window": 32}),
         ("sac", {"steps": 5000}, {"steps": 5000, "first_random": 4999}),

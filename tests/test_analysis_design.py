@@ -1,5 +1,6 @@
 """caster_gym.analysis.design: optima against dense grids, the rule of scaling, room for wheels, targets refused."""
 
+import re
 from itertools import combinations
 
 import numpy as np
@@ -22,6 +23,7 @@ from caster_gym.analysis.isotropy import global_isotropies
 from caster_gym.analysis.joint_sets import classify
 from caster_gym.analysis.sizing import motor_uses, require
 from caster_gym.configuration import ConfigurationError, parse
+from caster_gym.robot import Robot
 from tests.random_robots import random_robot
 
 ROBOT = load_robot("chung2008")
@@ -238,6 +240,21 @@ def test_bounds_within_which_wheels_always_touch_are_refused():
         optimise(ROBOT, target)
 
 
+def test_wheels_within_the_room_that_a_message_names_do_not_touch():
+    with pytest.raises(ValueError, match="must stay below") as error:
+        Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (0.08, 0.1)}))
+    room = float(re.search(r"below ([\d.]+) m", str(error.value))[1])
+    least = BOUNDS["radius"][0]
+    assert Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (room - least - 1e-9, 0.1)}))
+
+
+def test_casters_at_one_place_are_told_that_no_wheels_have_room():
+    first, *others = ROBOT.casters
+    one_place = ROBOT.model_copy(update={"casters": (first, first, *others)})
+    with pytest.raises(ValueError, match="radius and trail have no room at all"):
+        Region.of(one_place, EVEN)
+
+
 def test_casters_that_differ_are_refused():
     with pytest.raises(ValueError, match="must have the same radius to be designed together, got"):
         optimise(random_robot(0, 3), EVEN)
@@ -245,14 +262,22 @@ def test_casters_that_differ_are_refused():
 
 def test_motors_that_are_too_slow_for_every_design_are_refused():
     target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "use", "speed": 20.0})
-    with pytest.raises(ValueError, match="no design within the bounds reaches the target"):
+    with pytest.raises(ValueError, match=r"no design within the bounds reaches the target.* would do") as error:
         optimise(ROBOT, target)
+    factor = float(re.search(r"motors (\S+) times as fast", str(error.value))[1])
+    content = ROBOT.model_dump()
+    for caster in content["casters"]:
+        for joint in ("roll", "steer"):
+            caster[joint]["max_speed"] *= factor
+    assert optimise(Robot.model_validate(content), target).value > 0.0
 
 
 @pytest.mark.parametrize("joints", [("roll_1", "roll_2", "roll_3"), ("roll_1", "steer_1", "roll_2", "steer_3")])
 def test_singular_driven_joints_are_refused(joints):
     target = DesignTarget(**LIMITS, **BOUNDS, actuation=joints)
-    with pytest.raises(ValueError, match=r"cannot push itself in every direction .* drive both joints of two casters"):
+    with pytest.raises(
+        ValueError, match=r"cannot push itself in every direction .* drive roll_1, steer_1, roll_2, steer_2"
+    ):
         optimise(ROBOT, target)
 
 

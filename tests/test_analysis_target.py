@@ -56,11 +56,23 @@ def test_a_wrong_target_is_refused_by_a_sentence_that_names_the_key(change, word
 
 def test_driven_joints_that_are_singular_somewhere_are_refused():
     robot = load_robot("chung2008")
-    with pytest.raises(ValueError, match="drive both joints of two casters"):
+    with pytest.raises(ValueError, match=r"; drive roll_1, steer_1, roll_2, steer_2$"):
         check_actuation(robot.with_actuation(["roll_1", "roll_2", "roll_3"]))
     with pytest.raises(ValueError, match=r"three joints or more of robot 'chung2008', got roll_1, steer_1"):
         check_actuation(robot.with_actuation(["roll_1", "steer_1"]))
     check_actuation(robot)
+
+
+@pytest.mark.parametrize("trail", [0.025, 0.1, 0.3])
+@pytest.mark.parametrize("name", ["chung2008", "tidybot2"])
+@pytest.mark.parametrize("driven", [("roll_1", "steer_1", "roll_2"), ("steer_1", "steer_2", "steer_3")])
+def test_the_joints_that_a_refusal_names_can_push_everywhere_with_trails_of_any_length(name, trail, driven):
+    original = load_robot(name)
+    casters = tuple(caster.model_copy(update={"trail": trail}) for caster in original.casters)
+    robot = original.model_copy(update={"casters": casters})
+    with pytest.raises(ValueError, match=r"; drive [\w, ]+$") as error:
+        check_actuation(robot.with_actuation(driven))
+    check_actuation(robot.with_actuation(str(error.value).rsplit("; drive ", 1)[1].split(", ")))
 
 
 def test_trails_with_which_two_wheels_can_meet_are_refused_for_their_length():
@@ -86,3 +98,5 @@ def test_motors_that_push_unevenly_are_refused_for_that_and_not_as_singular():
     with pytest.raises(ValueError, match=r"radius 0\.1 mm, trail 25 mm.*bring radius and trail nearer to each other"):
         check_conditioning(robot)
     check_conditioning(original)
+    nearer = tuple(caster.model_copy(update={"radius": 0.02}) for caster in original.casters)
+    check_conditioning(original.model_copy(update={"casters": nearer}))

@@ -1,5 +1,7 @@
 """caster_gym.arena.beside: obstacles near a path, drawn at random."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -118,11 +120,16 @@ def test_a_robot_that_only_turns_gets_its_obstacles_too():
     assert ((gaps.min(0) >= LEAST - ROUNDING) & (gaps.min(0) <= GREATEST + ROUNDING)).all()
 
 
-def test_where_there_is_no_room_the_path_is_named():
-    """A room that fits the path closely has none left for pillars."""
-    low, high = PATHS[0][:, :2].min(0) - 0.16, PATHS[0][:, :2].max(0) + 0.16
-    arena = read_arena({"room": [low.tolist(), high.tolist()], "beside": {"pillars": 90, "walls": 2}})
-    with pytest.raises(
-        ValueError, match=r"90 pillars and 2 walls do not fit beside path 'eight': there is room for \d+ "
-    ):
-        draw_beside(arena, HULLS["chung2008"], PATHS[0], 0, "eight")
+@pytest.mark.parametrize(
+    "asked", [{"pillars": 90, "walls": 2}, {"pillars": 1, "walls": 30}, {"pillars": 12, "gap": [1, 2]}], ids=str
+)
+def test_where_there_is_no_room_the_path_is_named_and_so_many_as_are_told_fit(asked):
+    """A room that fits the path closely has little left."""
+    low, high = PATHS[0][:, :2].min(0) - 0.3, PATHS[0][:, :2].max(0) + 0.3
+    crowded = {"room": [low.tolist(), high.tolist()], "beside": asked}
+    with pytest.raises(ValueError, match=r"pillars and \d+ walls do not fit beside path 'eight'; .* would do") as error:
+        draw_beside(read_arena(crowded), HULLS["chung2008"], PATHS[0], 0, "eight")
+    pillars, walls = map(int, re.findall(r"'pillars' of (\d+) and 'walls' of (\d+)", str(error.value))[0])
+    fewer = read_arena({**crowded, "beside": {**asked, "pillars": pillars, "walls": walls}})
+    drawn = draw_beside(fewer, HULLS["chung2008"], PATHS[0], 0, "eight")
+    assert (len(drawn.pillars), len(drawn.walls)) == (pillars, walls)

@@ -235,8 +235,8 @@ def pillar(x, y, radius=0.1):
     ("arguments", "message"),
     [
         ({"windw": 1.0}, "'windw'.*did you mean 'window'"),
-        ({"window": 0.03}, r"window of 0\.03 m must be at least twice .* 0\.02 m"),
-        ({"speed_limit": 6.0}, r"window of 0\.2 m must be at least twice .* 0\.12 m"),
+        ({"window": 0.03}, r"window of 0\.03 m must be at least 0\.04 m, twice"),
+        ({"speed_limit": 6.0}, r"window of 0\.2 m must be at least 0\.24 m, twice"),
         ({"preview": (0.3, 0.1)}, r"preview distances must rise from one to the next, got \[0\.3, 0\.1\]"),
         ({"preview": (0.1, 0.1)}, "preview distances must rise"),
         ({"preview": (0.0,)}, "greater than 0"),
@@ -299,3 +299,11 @@ def _started():
     env = CasterFollowEnv(path=CIRCLE)
     env.reset(seed=0)
     return env
+
+
+@pytest.mark.parametrize("fields", [{"window": 0.03}, {"speed_limit": 1 / 3, "control_period": 0.013, "window": 1e-3}])
+def test_the_window_that_a_message_names_is_wide_enough(fields):
+    with pytest.raises(ValueError, match="must be at least") as error:
+        FollowTask(**fields)
+    least = float(re.search(r"at least ([\d.]+) m", str(error.value))[1])
+    assert FollowTask(**{**fields, "window": least})

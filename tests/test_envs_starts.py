@@ -1,5 +1,7 @@
 """caster_gym.envs.starts: a start that is given is the one that is had, alone, in a batch and in Torch."""
 
+import re
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -251,6 +253,14 @@ def test_what_can_be_no_start_is_refused_and_changes_nothing(place, options, mes
     assert_array_equal(states(env), before)
     assert env.engine.episodes(np.zeros(1, dtype=np.int64)) == episodes
     env.step(np.full(6, 0.2, dtype=np.float32))
+
+
+@pytest.mark.parametrize(("place", "path"), [("progress", {"radius": 0.51234567}), ("time", {"duration": 9.87})])
+def test_the_farthest_place_that_a_message_names_is_taken(place, path):
+    env = KINDS[place][0](path={"shape": "circle", **path})
+    with pytest.raises(ValueError, match="must lie in 0") as error:
+        env.reset(seed=SEED, options={place: 99.0})
+    env.reset(seed=SEED, options={place: float(re.search(r"0 … ([\d.]+) ", str(error.value))[1])})
 
 
 def test_which_robot_of_a_batch_starts_outside_is_told():

@@ -66,6 +66,13 @@ def test_a_rotation_in_degrees_is_refused_with_its_radians(shape):
     assert read_paths({"shape": shape, "rotation": 1.5708})[0].rotation == 1.5708
 
 
+def test_a_rotation_of_many_turns_in_degrees_is_refused_with_one_that_is_accepted():
+    with pytest.raises(ConfigurationError, match="'rotation' must be in radians") as error:
+        read_paths({"shape": "circle", "rotation": 36090})
+    told = float(str(error.value).rsplit(" ", 1)[1])
+    assert read_paths({"shape": "circle", "rotation": told})[0].rotation == pytest.approx(np.pi / 2, rel=1e-5)  # digits
+
+
 def test_turns_in_degrees_are_refused_with_their_number():
     with pytest.raises(ConfigurationError, match="and 720 looks like degrees; if it is, write 2"):
         read_paths({"shape": "circle", "heading": {"kind": "spinning", "turns": 720}})

@@ -153,8 +153,25 @@ def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they
         build_trajectories(path, ROBOT, 0.1)
     duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
     assert build_trajectories({**path, "duration": duration}, ROBOT, 0.1)
-    with pytest.raises(ValueError, match="nothing within 1000000 time steps would do"):
+    with pytest.raises(ValueError, match="takes more time steps than a path may have"):
         build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 6e4}, ROBOT, 0.1)
+
+
+@pytest.mark.parametrize("path", [{"shape": "circle"}, {"shape": "spline", "waypoints": [[0, 0, 0], [2, 1, 1]]}])
+def test_viscous_friction_falls_with_speed_and_the_slow_path_that_is_offered_is_driven(path):
+    sticky = robot_with(roll={"max_torque": 0.2, "max_speed": 100.0, "viscous": 0.5})
+    with pytest.raises(ValueError, match="would do") as error:
+        build_trajectories(path, sticky, 0.02)
+    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    assert build_trajectories({**path, "duration": duration}, sticky, 0.02)
+
+
+def test_a_path_that_would_take_too_many_time_steps_is_told_how_much_slower_it_must_be():
+    far = {"shape": "circle", "radius": 1e4, "duration": 1000.0}
+    with pytest.raises(ValueError, match=r"must be driven \S+ times as slowly, .* more time steps than") as error:
+        build_trajectories(far, ROBOT, 0.02)
+    slower = float(re.search(r"driven (\S+) times", str(error.value)).group(1))
+    assert build_trajectories({**far, "duration": 1000.0 * slower}, ROBOT, 0.05)
 
 
 def test_a_feasible_path_passes_in_silence():

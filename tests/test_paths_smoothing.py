@@ -89,3 +89,15 @@ def test_no_curve_swings_out_between_points_whose_noise_is_larger_than_the_toler
     if spline is not None:
         assert np.hypot(*np.diff(spline(np.linspace(0.0, 1.0, 20001)), axis=0).T).sum() < 1.5 * chords
     assert (np.diff(at) > 0.0).all()
+
+
+@pytest.mark.parametrize("step", [0.002, 0.1, 1.0])
+@pytest.mark.parametrize("tolerance", [0.001, 0.05])
+def test_sparse_points_that_zigzag_do_not_swing_out_from_pass_to_pass(step, tolerance):
+    """A curve near twelve corners is about as long as the way between them: half as long again leaves room to round."""
+    points = np.array([(step * k, k % 2) for k in range(12)], dtype=np.float64)
+    spline, at = smoothed_curve(points, np.ones(12), tolerance, False, np.inf)
+    assert rms(np.hypot(*(spline(at) - points).T)) == pytest.approx(tolerance, rel=5e-3)  # as the bisection leaves
+    along = spline(np.linspace(0.0, 1.0, 2001))
+    chords = np.hypot(*np.diff(points, axis=0).T).sum()
+    assert np.hypot(*np.diff(along, axis=0).T).sum() < 1.5 * chords

@@ -232,3 +232,4 @@ def test_friction_beyond_the_motors_is_refused_with_path_place_and_joint():
     with pytest.raises(ValueError, match=re.escape(expected)):
         law(LINE, stuck)
     assert law(LINE, robot_with(roll={"max_torque": 0.2, "max_speed": 100.0, "coulomb": 0.05}))[0].duration > 0.0
+    assert law(LINE, robot_with(roll={"max_torque": 2.0, "max_speed": 100.0, "coulomb": 0.5}))[0].duration > 0.0

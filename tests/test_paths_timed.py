@@ -240,9 +240,18 @@ def test_poses_that_make_no_motion_are_refused(content, message):
 
 def test_too_few_time_steps_are_refused_and_the_stretch_offered_does():
     path = {"shape": "timed", "poses": [[0, 0, 0, 0], [0.1, 0.001, 0, 0]]}
-    with pytest.raises(ValueError, match=r"5 time steps of 0\.02 s; a path needs at least 10: a stretch of 2 would do"):
+    with pytest.raises(ValueError, match=r"5 time steps of 0\.02 s; a path needs at least 10, that is a stretch of 2;"):
         build_trajectories(path, ROBOT, 0.02)
-    assert build_trajectories({**path, "stretch": 2}, ROBOT, 0.02)
+    assert read_paths({**path, "stretch": 2})[0].trajectories(0.02)
+
+
+@pytest.mark.parametrize("lasting", [0.1, 1e-6, 0.0123456])
+def test_a_short_record_is_driven_once_it_is_stretched_as_its_message_says(lasting):
+    path = {"shape": "timed", "poses": [[0, 0, 0, 0], [lasting, 1, 0, 0]]}
+    with pytest.raises(ValueError, match="would do") as error:
+        build_trajectories(path, ROBOT, 0.02)
+    (stretch,) = re.findall(r"a stretch of at least (\S+) would do", str(error.value))
+    assert build_trajectories({**path, "stretch": float(stretch)}, ROBOT, 0.02)
 
 
 def test_points_of_different_sizes_are_refused_with_those_that_are_taken():

@@ -20,7 +20,7 @@ from caster_gym.analysis.envelope import Motions, envelope_loads, joined, path_l
 from caster_gym.analysis.isotropy import global_isotropies
 from caster_gym.analysis.sizing import driven_motors, harder_motions, motor_shares, motor_uses, trajectories_of
 from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
-from caster_gym.paths.trajectory import Trajectory
+from caster_gym.paths.trajectory import Trajectory, rounded_down
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -73,10 +73,10 @@ class Region(NamedTuple):
         room = wheel_room(robot)
         least = target.radius[0] + target.trail[0]
         if least >= room:
+            together = f"together must stay below {rounded_down(room, 4):g} m" if room > 0.0 else "have no room at all"
             raise ValueError(
                 f"wheels of radius {target.radius[0]:g} m and trail {target.trail[0]:g} m, the least that the bounds "
-                f"allow, could touch those of another caster of robot {robot.name!r}: radius and trail together must "
-                f"stay below {room:.4g} m"
+                f"allow, could touch those of another caster of robot {robot.name!r}: radius and trail {together}"
             )
         return cls((target.radius[0], min(target.radius[1], room - target.trail[0])), target.trail, room)
 
@@ -206,7 +206,7 @@ def optimise(robot: Robot, target: DesignTarget, report: Callable[[float], None]
     if not np.isfinite(costs).any():
         raise ValueError(
             f"no design within the bounds reaches the target: motors of robot {robot.name!r} turn faster than their "
-            f"top speeds, with a margin of {target.margin:g}; larger wheels, longer trails or faster motors would do"
+            f"top speeds, with a margin of {target.margin:g}{_fast_enough(able, target, region)}"
         )
     starts = _local_optima(costs)[:_STARTS]
     place, total = places[starts[0]], len(starts) + _EXCHANGES
@@ -246,6 +246,24 @@ def optimise(robot: Robot, target: DesignTarget, report: Callable[[float], None]
         grid=(*region.design(places), search.sign * costs),
         motions=search.motions,
     )
+
+
+def _fast_enough(robot: Robot, target: DesignTarget, region: Region) -> str:
+    """How much faster motors must be for a design at a corner of the region to reach the target, as advice."""
+    for factor in (1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0):
+        casters = tuple(
+            caster.model_copy(
+                update={
+                    name: motor.model_copy(update={"max_speed": factor * motor.max_speed})
+                    for name, motor in (("roll", caster.roll), ("steer", caster.steer))
+                }
+            )
+            for caster in robot.casters
+        )
+        search = _Search(robot.model_copy(update={"casters": casters}), target, region)
+        if np.isfinite(search.costs(np.array(_TYPICAL[1:]))).any():
+            return f"; motors {factor:g} times as fast would do"
+    return ""
 
 
 def _around(radius: float, trail: float) -> tuple[tuple[str, float, float], ...]:

@@ -1,5 +1,6 @@
 """What a robot is to be able to do, from which the size of its wheels and motors follows."""
 
+from itertools import combinations
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -75,12 +76,24 @@ def check_actuation(robot: Robot) -> None:
     if found.steering is None:
         return
     angles = ", ".join(f"{np.degrees(angle):.1f}°" for angle in found.steering)
-    paired = sum({f"roll_{i}", f"steer_{i}"} <= set(robot.driven) for i in range(1, robot.caster_count + 1))
-    remedy = "choose shorter trails" if paired > 1 else "drive both joints of two casters"
     raise ValueError(
         f"robot {robot.name!r} driven by {names} cannot push itself in every direction at the steering angles "
-        f"({angles}), so no motors are strong enough; {remedy}"
+        f"({angles}), so no motors are strong enough; {_remedy(robot)}"
     )
+
+
+def _remedy(robot: Robot) -> str:
+    """Joints to drive that can push the robot in every direction, as it is."""
+    joints = [(f"roll_{i}", f"steer_{i}") for i in range(1, robot.caster_count + 1)]
+    paired = sum(set(pair) <= set(robot.driven) for pair in joints)
+    pairs = ((*one, *other) for one, other in combinations(joints, 2))
+    able = next((some for some in (*pairs, robot.joints) if classify(robot, some).steering is None), None)
+    ways = ["choose shorter trails"] if paired > 1 or able is None else []
+    if able is not None:
+        ways.append(f"drive {', '.join(able)}")
+    elif paired < 2:
+        ways.append("drive both joints of two casters")
+    return " and ".join(ways) if able is None else " or ".join(ways)
 
 
 def check_conditioning(robot: Robot) -> None:

@@ -34,24 +34,40 @@ def draw_beside(
     whole path lies in `gap`; that at the first pose is no less than start_margin [m]. Obstacles overlap no others.
     Raises ValueError if there is no room for one.
     """
-    beside = arena.beside
-    if beside is None:
+    if arena.beside is None:
         return arena
-    rng = np.random.default_rng((beside.seed, index))
     track = _track(hull, poses)
+    drawn = _drawn(arena, arena.beside, track, index, start_margin)
+    if _counts(drawn, arena) == (arena.beside.pillars, arena.beside.walls):
+        return drawn
+    fewer = arena.beside
+    while (found := _counts(drawn, arena)) != (fewer.pillars, fewer.walls):  # fewer are drawn at other places
+        pillars, walls = (count - count // 5 for count in found)  # many more tries would find some more
+        fewer = fewer.model_copy(update={"pillars": pillars, "walls": walls})
+        drawn = _drawn(arena, fewer, track, index, start_margin)
+    raise ValueError(
+        f"{arena.beside.pillars} pillars and {arena.beside.walls} walls do not fit beside path {name!r}; "
+        f"'pillars' of {fewer.pillars} and 'walls' of {fewer.walls} would do"
+    )
+
+
+def _drawn(arena: Arena, beside: Beside, track: _Track, index: int, start_margin: float) -> Arena:
+    """The arena with as many of the obstacles, one after another, as there is room for."""
+    rng = np.random.default_rng((beside.seed, index))
     drawn = arena.model_copy(update={"beside": None})
     for shape in _shapes(beside, rng):
         places = (_beside_path(shape, beside, track, rng) for _ in range(_TRIES))
         found = next((one for one in places if _fits(one, drawn, track, beside, start_margin)), None)
         if found is None:
-            raise ValueError(
-                f"{beside.pillars} pillars and {beside.walls} walls do not fit beside path {name!r}: there is room for "
-                f"{len(drawn.pillars) - len(arena.pillars)} and {len(drawn.walls) - len(arena.walls)} of them; "
-                f"ask for fewer or smaller ones, or for wider gaps"
-            )
+            return drawn
         key = "pillars" if isinstance(found, Pillar) else "walls"
         drawn = drawn.model_copy(update={key: (*getattr(drawn, key), found)})
     return drawn
+
+
+def _counts(drawn: Arena, arena: Arena) -> tuple[int, int]:
+    """Pillars and walls that were drawn into an arena."""
+    return len(drawn.pillars) - len(arena.pillars), len(drawn.walls) - len(arena.walls)
 
 
 def _track(hull: Hull, poses: Array) -> _Track:

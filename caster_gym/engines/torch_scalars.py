@@ -60,8 +60,8 @@ def check_memory(robots: int, numbers: int, dtype: torch.dtype, device: torch.de
         room = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > room:
         raise ValueError(
-            f"a batch of {robots:,} robots needs at least {needed / 2**30:,.0f} GiB of memory, and device "
-            f"{str(device)!r} has {room / 2**30:,.0f} GiB: take fewer robots"
+            f"a batch of {robots:,} robots needs at least {needed / 2**30:,.3g} GiB of memory, and device "
+            f"{str(device)!r} has {room / 2**30:,.3g} GiB: take fewer robots"
         )
 
 

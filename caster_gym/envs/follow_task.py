@@ -8,6 +8,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from caster_gym.configuration import parse
 from caster_gym.envs.following import FollowWeights
 from caster_gym.envs.task import Task
+from caster_gym.paths.trajectory import rounded_up
 
 
 class FollowTask(Task):
@@ -42,8 +43,8 @@ class FollowTask(Task):
             raise ValueError(f"preview distances must rise from one to the next, got {list(self.preview)}")
         if self.window < 2.0 * self.stride:
             raise ValueError(
-                f"the window of {self.window:g} m must be at least twice the way of a control period at the speed "
-                f"limit, {self.stride:g} m"
+                f"the window of {self.window:g} m must be at least {rounded_up(2.0 * self.stride, 6):g} m, twice the "
+                "way of a control period at the speed limit"
             )
         self.check_start()
         return self

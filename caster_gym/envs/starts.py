@@ -18,6 +18,7 @@ from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.randomness import bits, episode_seed
 from caster_gym.envs.task_engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.tracking import Reference, start
+from caster_gym.paths.trajectory import rounded_down
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -138,10 +139,8 @@ def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> A
     bad = (place < 0.0) | (place > most * _BY_ROUNDING)
     if bad.any():
         i = int(bad.argmax())
-        raise ValueError(
-            f"options[{name!r}] must lie in 0 … {most[i]:g} {unit} on path {engine.plan.names[paths[i]]!r}, "
-            f"got {place[i]:g} {unit}"
-        )
+        path, last = engine.plan.names[paths[i]], rounded_down(most[i], 6)
+        raise ValueError(f"options[{name!r}] must lie in 0 … {last:g} {unit} on path {path!r}, got {place[i]:g} {unit}")
     within: Array = np.minimum(place, most)
     return within
 

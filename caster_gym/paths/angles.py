@@ -64,7 +64,7 @@ def _no_degrees(angle: float) -> float:
     if unlikely_angle(angle):
         raise ValueError(
             f"must be in radians, got {angle:g}, which can hardly be; "
-            f"if that is in degrees, write {np.radians(angle):.6g}"
+            f"if that is in degrees, write {np.radians(math.remainder(angle, 360.0)):.6g}"
         )
     return angle
 

@@ -21,6 +21,7 @@ FINEST_SPACING = 0.001  # [m] finer rows would be many; no robot drives an arc o
 _TRIES = 3  # of spacings, each of which suits the samples of the one before
 _TIMED_STEP = 0.02  # [s] at which a path is tried as a trajectory: the period of the environments
 _MOST_FIRST_SAMPLES = 4_000  # a heading that still jumps turns on the spot
+_MOST_TRIED_SAMPLES = 100_000  # of a path that advice tries: about 500 m at 2 cm, 25 m at 1 mm
 _FEWEST_SAMPLES = 1000  # of a path's own trajectory, from which its line is made
 _STEP = 0.5  # [-] of the spacing: greatest way between them; a cubic of 1 cm errs by 0.01 µm at a radius of 15 cm
 
@@ -167,30 +168,32 @@ class _RefusedError(ValueError):
 
 def _makes_lines(specification: AnyPath, free_heading: bool) -> bool:
     try:
-        return bool(_lines_as_they_are(specification, None, free_heading))
+        return bool(_lines_as_they_are(specification, None, free_heading, _MOST_TRIED_SAMPLES))
     except ValueError:
         return False
 
 
-def _lines_as_they_are(specification: AnyPath, spacing: float | None, free_heading: bool) -> list[Line]:
-    """The lines of one specification, from trajectories that are sampled finely enough; spacing None: one that does."""
+def _lines_as_they_are(
+    specification: AnyPath, spacing: float | None, free_heading: bool, most: int = MOST_STEPS
+) -> list[Line]:
+    """The lines of one specification, from trajectories of at most so many samples; spacing None: one that does."""
     if free_heading and isinstance(specification, Spline):
         specification = specification.without_headings()
     coarse = SPACING if spacing is None else spacing
     lines: list[Line] = []
     name: str = specification.shape
     try:
-        trajectories = _sampled(specification, coarse)
+        trajectories = _sampled(specification, coarse, most)
         for k, trajectory in enumerate(trajectories):
             name = trajectory.name
             tried = coarse
             for _ in range(_TRIES):
                 try:
-                    fine = trajectory if tried == coarse else _sampled(specification, tried)[k]
+                    fine = trajectory if tried == coarse else _sampled(specification, tried, most)[k]
                     lines.append(line_along(fine, tried, free_heading))
                     break
                 except CoarseSpacingError as error:
-                    if spacing is not None or tried == FINEST_SPACING:
+                    if spacing is not None or tried == FINEST_SPACING or len(fine.samples) > most:
                         raise
                     tried = max(error.spacing, FINEST_SPACING)
             else:
@@ -200,8 +203,12 @@ def _lines_as_they_are(specification: AnyPath, spacing: float | None, free_headi
     return lines
 
 
-def _sampled(specification: AnyPath, spacing: float) -> tuple[Trajectory, ...]:
-    """Trajectories of a specification whose samples lie nearer to each other than rows of a line."""
+def _sampled(specification: AnyPath, spacing: float, most: int) -> tuple[Trajectory, ...]:
+    """Trajectories of a specification whose samples lie nearer to each other than rows of a line.
+
+    A path that is too long for that has as many as a trajectory may have; one that needs more than a smaller number is
+    refused.
+    """
     samples = _FEWEST_SAMPLES
     while True:
         try:
@@ -214,6 +221,8 @@ def _sampled(specification: AnyPath, spacing: float) -> tuple[Trajectory, ...]:
     ways = max(float(np.hypot(*t.samples[:, 4:6].T).max()) * t.time_step for t in trajectories)
     if ways > _STEP * spacing:
         samples = min(int(np.ceil(samples * ways / (_STEP * spacing))), MOST_STEPS)
+        if samples > most:
+            raise NoLineError(f"it needs more than {most} samples")
         trajectories = specification.trajectories(specification.duration / samples)
     return trajectories
 

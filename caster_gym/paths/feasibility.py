@@ -22,12 +22,13 @@ from caster_gym.mechanics.motors import motor_ranges, motor_speeds
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, total
 from caster_gym.paths.trailing import trailing_directions
-from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory
+from caster_gym.paths.trajectory import Array, Plane, Trajectory
 from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
 _SLOW, _FALLS = 64.0, 0.9  # [-] factor of ease, from which on the use of motors must fall so much as it doubles
+_PRECISION = 1.02  # [-] of the factor that is found
 _BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
 
 
@@ -46,6 +47,8 @@ class MotorUse:
 class Easable(Protocol):
     """A path that knows slower versions of itself."""
 
+    @property
+    def duration(self) -> float: ...
     @property
     def remedy(self) -> str: ...
     def eased(self, factor: float) -> Self: ...
@@ -78,7 +81,7 @@ def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Rob
     k = int(hardest.use.argmax())
     if hardest.use[k] <= 1.0:
         return
-    remedy = _remedy(path, trajectories, robot)
+    remedy = _remedy(path, trajectories[k].time_step, robot)
     raise ValueError(f"path {trajectories[k].name!r} {_complaint(hardest, k, robot)}; {remedy}")
 
 
@@ -95,25 +98,29 @@ def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
     return f"asks {torque:.2g} N m of {joint} {when}, where its motor has {hardest.left[k]:.2g} N m left"
 
 
-def _remedy(path: Easable, trajectories: Sequence[Trajectory], robot: Robot) -> str:
-    """What would do for a path that is too fast: to ease it by little more than it must be, if that is enough."""
-    time_step = trajectories[0].time_step
+def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
+    """What going slower does: by little more than the path must, if it may last as long as that."""
 
-    def use(factor: float) -> float:
-        return float(motor_use(path.eased(factor).trajectories(time_step), robot).use.max())
+    def use(factor: float, whole: bool = False) -> float:
+        slower = path.eased(factor)
+        step = time_step if whole else time_step * slower.duration / path.duration  # as many samples are quicker
+        return float(motor_use(slower.trajectories(step), robot).use.max())
 
     high, asked = 1.0, np.inf
     while asked > 1.0:
         high, before = 2.0 * high, asked
-        if high * trajectories[0].duration > MOST_STEPS * time_step:
-            return f"nothing within {MOST_STEPS} time steps would do"
         asked = use(high)
-        if high >= _SLOW and 1.0 < asked > _FALLS * before:
-            return "going slower does not help"  # what is left is not due to the pace
+        if high >= _SLOW and 1.0 < asked > _FALLS * before:  # what is left is not due to the pace
+            return f"going slower does not help, not even {high:g} times"
     low = max(1.0, 0.5 * high)
-    while high > 1.02 * low:
+    while high > _PRECISION * low:
         middle = (low * high) ** 0.5
         low, high = (low, middle) if use(middle) <= 1.0 else (middle, high)
+    try:
+        while use(high, whole=True) > 1.0:  # more samples may see a little more
+            high *= _PRECISION
+    except ValueError:
+        return f"it must be driven {high:.3g} times as slowly, which takes more time steps than a path may have"
     return f"{path.eased(high).remedy} would do"
 
 

@@ -306,11 +306,10 @@ def _refuse_stiction(left: Array, lines: Sequence[Line], robot: Robot, margin: f
     line, joint, share = lines[k], c // 2, margin - left[f, c, k]
     x, y = line.rows[f // PARTS, 0:2]
     if joint < 2 * robot.caster_count:
-        takes = f"takes {share:.2g} of the greatest torque of {robot.joints[joint]}"
+        takes, else_ = f"takes {share:.2g} of the greatest torque of {robot.joints[joint]}", ", or stronger motors"
     else:
-        takes = f"pushes where the driven joints, {', '.join(robot.driven)}, cannot"
+        takes, else_ = f"pushes where the driven joints, {', '.join(robot.driven)}, cannot", ""
     raise ValueError(
         f"the robot cannot move along path {line.name!r} at s = {f * line.spacing / PARTS:.3g} m, (x, y) = "
-        f"({x:.3g}, {y:.3g}) m: dry friction {takes}, and the margin is {margin:g}; less friction would do, "
-        f"or stronger motors"
+        f"({x:.3g}, {y:.3g}) m: dry friction {takes}, and the margin is {margin:g}; less friction would do{else_}"
     )

@@ -17,6 +17,7 @@ from caster_gym.paths.trajectory import (
     place,
     rest_to_rest,
     rounded_down,
+    rounded_up,
     tabulate,
     whole_steps,
 )
@@ -71,9 +72,7 @@ class Shape(Frozen):
 
     def eased(self, factor: float) -> Self:
         """The same path, walked slower by a factor above 1; its duration keeps three digits, rounded up."""
-        duration = self.duration * factor
-        digit = 10.0 ** (np.floor(np.log10(duration)) - 2.0)
-        return self.model_copy(update={"duration": float(f"{np.ceil(duration / digit) * digit:.12g}")})
+        return self.model_copy(update={"duration": rounded_up(self.duration * factor)})
 
     def with_fixed_heading(self) -> Self | None:
         """The same path, along which the heading does not turn; None where its headings are its own."""

@@ -23,7 +23,8 @@ _LEAST_PIECE = 0.1  # [-] of the median distance between places: knots are no ne
 _WEAKEST, _STIFF, _STRONGEST = -9.0, 4.0, 9.0
 _BISECTIONS = 16  # to 2e-4 of a power
 _PASSES = 3  # of fits at the arc lengths of the fit before: chords between noisy points are too long, and unequal
-_LONGEST = 1.5  # [-] of the way from point to point: a longer curve swings out between its knots
+_LONGEST = 1.5  # [-] of the way from point to point: a longer curve swings out between its knots, and is none
+_LONGER = 1.02  # [-] of that way: a curve as long as that swings out between sparse points, with each pass farther
 _FINE = 8  # samples for each piece, from which an arc length is summed
 
 
@@ -122,9 +123,10 @@ def smoothed_curve(points: Array, weights: Array, tolerance: float, closed: bool
         spline = smoothed(points, at, weights, tolerance, closed, most)
         fine = np.linspace(0.0, 1.0, _FINE * len(spline.c) + 1)
         pace = np.hypot(*spline(fine, 1).T)
-        way = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]))])
-        if way[-1] > _LONGEST * len(fine) * chords.sum():
+        way = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]) * np.diff(fine))])
+        if way[-1] > _LONGEST * chords.sum():
             return None, by_chords
-        if fits < _PASSES:
-            at = np.interp(at, fine, way / way[-1])
+        if fits == _PASSES or way[-1] > _LONGER * chords.sum():
+            break
+        at = np.interp(at, fine, way / way[-1])
     return spline, at

@@ -67,7 +67,7 @@ class Spline(Shape):
     @model_validator(mode="after")
     def _waypoints_make_a_curve(self) -> Self:
         if not self.closed and self.laps > 1:
-            round_course = "; set 'closed' for a round course" if len(set(self.waypoints)) > 2 else ""
+            round_course = "; set 'closed' for a round course" if self._could_be_closed else ""
             raise ValueError(f"an open spline has one lap, got laps {self.laps}{round_course}")
         if len({len(waypoint) for waypoint in self.waypoints}) > 1:
             raise ValueError("either every waypoint has a heading or none has")
@@ -80,10 +80,14 @@ class Spline(Shape):
                 f"a tolerance of {self.tolerance:g} m is more than a tenth of the {extent:.3g} m that the waypoints "
                 f"extend; at most {rounded_down(extent / _LEAST_SIZE):g} m would do"
             )
-        fewest = min((len(leg.points) - 1 for leg in self._track.legs if leg.closed), default=3)
+        fewest = _fewest_places(self._track)
         if fewest < 3:
             raise ValueError(f"a closed spline needs at least 3 waypoints at different places, got {fewest}")
         return self
+
+    @property
+    def _could_be_closed(self) -> bool:
+        return len({waypoint[:2] for waypoint in self.waypoints}) > 1 and _fewest_places(self._read(closed=True)) >= 3
 
     @property
     def _has_headings(self) -> bool:
@@ -91,7 +95,10 @@ class Spline(Shape):
 
     @property
     def _track(self) -> Track:
-        return _read_track(self.waypoints, self.closed, self.laps, self.tolerance, self.heading_tolerance, self.turns)
+        return self._read(self.closed)
+
+    def _read(self, closed: bool) -> Track:
+        return _read_track(self.waypoints, closed, self.laps, self.tolerance, self.heading_tolerance, self.turns)
 
     @property
     def description(self) -> str:
@@ -157,6 +164,11 @@ class Spline(Shape):
         for tolerance in SIZES:
             if self._track.tolerance < tolerance <= most:
                 yield self.model_copy(update={"tolerance": tolerance}), f"a tolerance of {tolerance:g} m"
+
+
+def _fewest_places(track: Track) -> int:
+    """Different places of its closed leg; 3, which are enough, if it has none."""
+    return min((len(leg.points) - 1 for leg in track.legs if leg.closed), default=3)
 
 
 @lru_cache(maxsize=32)

@@ -88,7 +88,7 @@ def _block(lines: Sequence[Line], steps: int, robot: Robot, speed_limit: float, 
     raise ValueError(
         f"the robot cannot move along path {line.name!r} at s = {k * line.spacing:.3g} m, "
         f"(x, y) = ({line.rows[k, 0]:.3g}, {line.rows[k, 1]:.3g}) m, with a margin of {margin:g}: a caster flips or "
-        f"friction changes its sign there; less friction would do, or stronger motors"
+        f"friction changes its sign there; less friction or stronger motors may help"
     )
 
 

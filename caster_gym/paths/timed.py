@@ -11,7 +11,16 @@ from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import AngleUnit, Rotation, plain, read_angles
 from caster_gym.paths.files import ZeroAxis, read_poses, unwrapped
 from caster_gym.paths.splines import Spline
-from caster_gym.paths.trajectory import LEAST_STEPS, MOST_STEPS, Array, Trajectory, check_time_step, place, tabulate
+from caster_gym.paths.trajectory import (
+    LEAST_STEPS,
+    MOST_STEPS,
+    Array,
+    Trajectory,
+    check_time_step,
+    place,
+    rounded_up,
+    tabulate,
+)
 
 TimedPose = tuple[float, float, float] | tuple[float, float, float, float]
 Rates = tuple[float, float, float, float, float, float]
@@ -97,8 +106,8 @@ class Timed(Frozen):
             raise ValueError(f"{self.duration:g} s are more than {MOST_STEPS} time steps of {time_step:g} s")
         if steps < LEAST_STEPS:
             raise ValueError(
-                f"{self.duration:g} s are {steps} time steps of {time_step:g} s; a path needs at least {LEAST_STEPS}: "
-                f"a stretch of {np.ceil(LEAST_STEPS * time_step / float(self._times[-1]) * 100.0) / 100.0:g} would do"
+                f"{self.duration:g} s are {steps} time steps of {time_step:g} s; a path needs at least {LEAST_STEPS}, "
+                f"that is a stretch of {rounded_up(LEAST_STEPS * time_step / float(self._times[-1])):g}"
             )
         moving = self._motion(np.minimum(np.arange(steps + 1) * time_step / self.stretch, self._times[-1]))
         value, first, second = (part / self.stretch**order for order, part in enumerate(moving))
@@ -190,9 +199,7 @@ class Timed(Frozen):
 
     def eased(self, factor: float) -> Self:
         """The same poses, later by a factor above 1; the stretch keeps three digits, rounded up."""
-        stretch = self.stretch * factor
-        digit = 10.0 ** (np.floor(np.log10(stretch)) - 2.0)
-        return self.model_copy(update={"stretch": float(f"{np.ceil(stretch / digit) * digit:.12g}")})
+        return self.model_copy(update={"stretch": rounded_up(self.stretch * factor)})
 
     @property
     def remedy(self) -> str:

@@ -61,6 +61,13 @@ def rounded_down(value: float, digits: int = 2) -> float:
     return float(f"{whole * digit:.12g}")
 
 
+def rounded_up(value: float, digits: int = 3) -> float:
+    """A positive value to so many digits, as advice: not below the value."""
+    digit = 10.0 ** (np.floor(np.log10(value)) + 1.0 - digits)
+    whole = np.ceil(value / digit * (1.0 - 1e-12))
+    return float(f"{whole * digit:.12g}")
+
+
 def check_time_step(time_step: float) -> None:
     """Refuse a time step [s] that is not a positive number."""
     if not (np.isfinite(time_step) and time_step > 0.0):
