@@ -307,3 +307,11 @@ def test_the_window_that_a_message_names_is_wide_enough(fields):
         FollowTask(**fields)
     least = float(re.search(r"at least ([\d.]+) m", str(error.value))[1])
     assert FollowTask(**{**fields, "window": least})
+
+
+def test_a_start_too_near_to_an_obstacle_is_free_once_it_is_displaced_less_as_is_advised():
+    near = {"path": CIRCLE, "arena": pillar(0.66, 0.0)}
+    with pytest.raises(ValueError, match="move the obstacle, or lower start_offset and start_turn"):
+        CasterFollowEnv(**near)
+    assert CasterFollowEnv(**near, start_offset=0.002, start_turn=0.01)
+    assert CasterFollowEnv(**{**near, "arena": pillar(0.69, 0.0)})
