@@ -233,3 +233,11 @@ def test_friction_beyond_the_motors_is_refused_with_path_place_and_joint():
         law(LINE, stuck)
     assert law(LINE, robot_with(roll={"max_torque": 0.2, "max_speed": 100.0, "coulomb": 0.05}))[0].duration > 0.0
     assert law(LINE, robot_with(roll={"max_torque": 2.0, "max_speed": 100.0, "coulomb": 0.5}))[0].duration > 0.0
+
+
+def test_friction_that_leaves_too_little_to_start_is_refused_and_less_of_it_or_more_torque_is_not():
+    nearly_stuck = {"max_torque": 0.2, "max_speed": 100.0, "coulomb": 0.155}
+    with pytest.raises(ValueError, match="friction changes its sign there; less friction or stronger motors may help"):
+        law("circle", robot_with(roll=nearly_stuck))
+    for helpful in ({"coulomb": 0.1}, {"max_torque": 0.4}):
+        assert law("circle", robot_with(roll={**nearly_stuck, **helpful}))[0].duration > 0.0

@@ -82,7 +82,10 @@ def _block(lines: Sequence[Line], steps: int, robot: Robot, speed_limit: float, 
             return square
         # more from round to round, for intervals in which another limit gives way to the one that is drawn in
         less = np.where(beyond > 0.0, (1.0 + 0.5 * attempt) * beyond + 2.0 * _CLOSE * margin, 0.0)
-        limits = limits.of(chosen).drawn_in(less, LEAST_LEFT * margin)
+        before = limits.of(chosen)
+        limits = before.drawn_in(less, LEAST_LEFT * margin)
+        if np.array_equal(limits.d, before.d):
+            break  # nothing is left to draw in
         square[:, going] = _laws(limits, spacing[going], ends[going])
     line, k = lines[going[0]], int(beyond[..., 0].max(axis=1).argmax())
     raise ValueError(
