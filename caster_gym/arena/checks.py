@@ -39,5 +39,6 @@ def check_free(
     if gaps[0, nearest] < start_margin - ROUNDING:
         raise ValueError(
             f"path {name!r} starts too near to {arena.obstacles[nearest][0]}: the gap is {gaps[0, nearest]:.3g} m, and "
-            f"{start_margin:.3g} m are needed for the displacements of the start; move the obstacle, or lower start_offset and start_turn"
+            f"{start_margin:.3g} m are needed for the displacements of the start; move the obstacle, or lower "
+            f"start_offset and start_turn"
         )

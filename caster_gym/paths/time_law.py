@@ -30,6 +30,7 @@ _FLAT = 1e-9  # [1/(m/s²)] a limit that depends on u by less bounds x alone
 _CLOSE = (
     3e-4  # [-] of the margin that a law may go beyond; where it goes farther, limits are drawn in by twice that more
 )
+_SHARES = np.linspace(0.0, 1.0, PARTS + 1)[:, None, None]  # [-] of an interval, where its limits stand
 _ROUNDS = 30  # of drawing limits in; most lines need one, the hardest of those tried needed six
 
 
@@ -132,7 +133,7 @@ def _bounds(planes: tuple[Array, Array, Array], k: int, end: Array, spacing: Arr
     """Bounds of u in interval k by x at its start, so that all limits are kept and x at its end lies in 0 … end."""
     points = slice(k * PARTS, (k + 1) * PARTS + 1)
     a, b, d = (plane[points] for plane in planes)
-    ahead = 2.0 * spacing * np.linspace(0.0, 1.0, PARTS + 1)[:, None, None]  # x there is x + ahead u
+    ahead = 2.0 * spacing * _SHARES  # x there is x + ahead u
     a = (a + ahead * b).reshape(-1, len(spacing))
     b, d = b.reshape(a.shape), d.reshape(a.shape)
     bound = np.abs(a) > _FLAT
@@ -140,7 +141,7 @@ def _bounds(planes: tuple[Array, Array, Array], k: int, end: Array, spacing: Arr
     at, by = d / slope, -b / slope
     up, down = a > _FLAT, a < -_FLAT
     most = np.where(~bound & (b > 0.0), d / np.where(b > 0.0, b, 1.0), np.inf).min(axis=0)
-    fall = np.broadcast_to(-0.5 / spacing, (1, len(spacing)))
+    fall = (-0.5 / spacing)[None]
     return _Bounds(
         np.concatenate([np.where(up, at, np.inf), 0.5 * end[None] / spacing]),
         np.concatenate([np.where(up, by, 0.0), fall]),
