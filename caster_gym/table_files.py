@@ -55,8 +55,6 @@ def read_text(path: Path) -> str:
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror or error}") from error
     marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
-    if content[:2] not in marks and b"\0" in content:
-        raise ValueError(f"{path} cannot be read as CSV: it has bytes of zero, as no text has; save it as UTF-8")
     try:
         text = content.decode(marks.get(content[:2], "utf-8-sig"))
     except UnicodeDecodeError as error:
