@@ -243,7 +243,7 @@ def test_completion_is_offered(call):
         (["--task", "lost.yaml"], "there is no file"),
         (
             ["--set", "learning_rate=1e9"],
-            "training has diverged after 64 steps, with a learning_rate of 1e+09: a smalle",
+            "training has diverged after 64 steps, with a learning_rate of 1e+09; try a small",
         ),
         (["--set", "n_steps=8"], "unknown key 'n_steps'; it is called 'horizon' here"),
     ],
