@@ -28,6 +28,7 @@ from caster_gym.robot import Robot
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
 _SLOW, _FALLS = 64.0, 0.9  # [-] factor of ease, from which on the use of motors must fall so much as it doubles
+_SLOWEST = 256.0  # [-] that is tried: below, dry friction fades, so that robots which are stuck would seem to creep
 _PRECISION = 1.02  # [-] of the factor that is found
 _BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
 
@@ -110,7 +111,7 @@ def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
     while asked > 1.0:
         high, before = 2.0 * high, asked
         asked = use(high)
-        if high >= _SLOW and 1.0 < asked > _FALLS * before:  # what is left is not due to the pace
+        if asked > 1.0 and (high >= _SLOWEST or (high >= _SLOW and asked > _FALLS * before)):
             return f"going slower does not help, not even {high:g} times"
     low = max(1.0, 0.5 * high)
     while high > _PRECISION * low:
