@@ -117,7 +117,9 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
             finals = self._finals(outcome, self._done)
             outcome = self.engine.restart(np.flatnonzero(self._done), outcome)
-        infos = finals | self._masked(self.engine.info(outcome.reports), self._everyone)
+        infos = self._masked(self.engine.info(outcome.reports), self._everyone)
+        if finals:
+            infos = finals | infos
         if self.render_mode == "human":
             self.render()
         return outcome.observations, outcome.rewards, outcome.terminated, outcome.truncated, infos

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from caster_gym.envs.block_layout import (
     CONDITIONING,
+    ENDINGS,
     FIRST_POSE,
     FIRST_RECORD,
     FIRST_SITUATION,
@@ -31,7 +32,12 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any
 
     Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
     """
-    row: Any = reports if reports.ndim > 1 else reports.tolist()  # numbers of one robot are Python's own
+    row: Any = reports
+    if reports.ndim > 1:
+        left, unfinite, touched = reports[:ENDINGS] > 0.0
+    else:
+        row = reports.tolist()  # numbers of one robot are Python's own
+        left, unfinite, touched = row[LEFT_CORRIDOR] > 0.0, row[NOT_FINITE] > 0.0, row[TOUCHED] > 0.0
     columns = reports.T
     return {
         "position_error": row[POSITION_ERROR],
@@ -49,7 +55,7 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any
         "impacts": row[FIRST_RECORD + 6],
         "impulse": columns[_IMPULSE],
         "normal_impulse": row[FIRST_RECORD + 3],
-        "left_corridor": row[LEFT_CORRIDOR] > 0.0,
-        "not_finite": row[NOT_FINITE] > 0.0,
-        "touched": row[TOUCHED] > 0.0,
+        "left_corridor": left,
+        "not_finite": unfinite,
+        "touched": touched,
     }

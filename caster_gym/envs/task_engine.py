@@ -183,8 +183,10 @@ class TaskEngine:
             self._told = reports.copy()
         if self.count == 1:
             self._desk_report[:] = reports[:, 0]
-        truncated = results[2] > 0.0 if self._late is None else self._over(self._late)
-        return Outcome(observations, results[0], results[1] > 0.0, truncated, reports)
+        terminated, truncated = results[1:] > 0.0
+        if self._late is not None:
+            truncated = self._over(self._late)
+        return Outcome(observations, results[0], terminated, truncated, reports)
 
     def step_alone(
         self, action: NDArray[np.float32]
