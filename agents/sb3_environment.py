@@ -62,7 +62,8 @@ class CasterVecEnv(VecEnv):
         self._lengths += 1
         self.last_infos = infos
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for robot in np.flatnonzero(done):
+        ended = np.flatnonzero(done)
+        for robot in ended:
             length = int(self._lengths[robot])
             each[robot] = {
                 "terminal_observation": infos["final_obs"][robot],
@@ -74,7 +75,8 @@ class CasterVecEnv(VecEnv):
                     "failed": bool(terminated[robot]),
                 },
             }
-        self._returns[done], self._errors[done], self._lengths[done] = 0.0, 0.0, 0
+        if len(ended):
+            self._returns[done], self._errors[done], self._lengths[done] = 0.0, 0.0, 0
         return observations, rewards.astype(np.float32), done, each
 
     def close(self) -> None:
