@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import read_paths
+from caster_gym.paths.angles import unwrapped
 from caster_gym.paths.headings import Fixed, Profile, Spinning, Tangent
 
 LINE = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]
@@ -92,3 +93,17 @@ def test_turns_in_degrees_are_refused_with_their_number():
 def test_other_units_and_words_are_refused_as_before(path, message):
     with pytest.raises(ConfigurationError, match=message):
         read_paths(path)
+
+
+@pytest.mark.parametrize(
+    ("angles", "expected"),
+    [
+        ([3.0, -3.0], [3.0, 2.0 * np.pi - 3.0]),  # wrapped at half a turn
+        ([0.0, 3.2], [0.0, 3.2]),  # beyond: as it stands
+        ([0.0, 6.2832], [0.0, 6.2832]),
+        ([0.0, 0.0, 4.0], [0.0, 0.0, 4.0]),
+        (np.arange(5.0, 9.0, 0.3) % (2.0 * np.pi), np.arange(5.0, 9.0, 0.3)),  # wrapped at a turn
+    ],
+)
+def test_only_wrapped_angles_are_unwrapped(angles, expected):
+    assert_allclose(unwrapped(np.array(angles)), expected, atol=1e-12)

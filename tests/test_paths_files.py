@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import build_trajectories, read_paths
-from caster_gym.paths.files import unwrapped
 from caster_gym.tables import TableNote
 
 ROBOT = load_robot("chung2008")
@@ -196,20 +195,6 @@ def test_a_timed_path_needs_times(tmp_path):
     file = written(tmp_path, "x,y\n0,0\n1,1\n")
     with pytest.raises(ConfigurationError, match=r"has no column of times; call it 'time \[s\]', or use .* 'spline'"):
         read_paths({"shape": "timed", "file": str(file)})
-
-
-@pytest.mark.parametrize(
-    ("angles", "expected"),
-    [
-        ([3.0, -3.0], [3.0, 2.0 * np.pi - 3.0]),  # wrapped at half a turn
-        ([0.0, 3.2], [0.0, 3.2]),  # beyond: as it stands
-        ([0.0, 6.2832], [0.0, 6.2832]),
-        ([0.0, 0.0, 4.0], [0.0, 0.0, 4.0]),
-        (np.arange(5.0, 9.0, 0.3) % (2.0 * np.pi), np.arange(5.0, 9.0, 0.3)),  # wrapped at a turn
-    ],
-)
-def test_only_wrapped_angles_are_unwrapped(angles, expected):
-    assert_allclose(unwrapped(np.array(angles)), expected, atol=1e-12)
 
 
 def test_a_file_of_a_loop_in_degrees_turns_once():

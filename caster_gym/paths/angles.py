@@ -9,9 +9,14 @@ import numpy as np
 from pydantic import AfterValidator
 
 from caster_gym.configuration import ConfigurationError
+from caster_gym.paths.trajectory import Array
 from caster_gym.units import UNITS, unlikely_angle, unlikely_radians
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
+ZeroAxis: TypeAlias = Literal["x", "y"]
+
+_CALM = 1.0  # [rad] from row to row: in between, angles that are wrapped jump by a turn
+_MANY = 10  # rows that show what is usual
 
 
 def plain(values: Any) -> Any:
@@ -74,3 +79,15 @@ Rotation: TypeAlias = Annotated[float, AfterValidator(_no_degrees)]  # [rad] a s
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def unwrapped(angles: Array) -> Array:
+    """Angles [rad] as they stand, if some are beyond what wrapped ones are, else on the turn nearest to the one before.
+
+    Many angles from 0 to a turn are taken to be wrapped if they change little from row to row but for jumps of a turn.
+    """
+    steps = np.abs(np.diff(angles))
+    half = bool(np.abs(angles).max(initial=0.0) <= np.pi + 1e-6)
+    whole = bool(((angles >= -1e-6) & (angles <= 2.0 * np.pi + 1e-6)).all())
+    calm = len(angles) >= _MANY and bool(((steps < _CALM) | (steps > 2.0 * np.pi - _CALM)).all())
+    return np.asarray(np.unwrap(angles) if half or (whole and calm) else angles, dtype=np.float64)

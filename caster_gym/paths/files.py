@@ -6,19 +6,17 @@ example of each kind of file.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from caster_gym.configuration import ConfigurationError
-from caster_gym.paths.angles import AngleUnit, degrees_by_mistake
+from caster_gym.paths.angles import AngleUnit, ZeroAxis, degrees_by_mistake, unwrapped
 from caster_gym.paths.planner_files import PLANNER_SUFFIXES, read_planner_file
 from caster_gym.paths.trajectory import Array
 from caster_gym.table_files import TABLE_SUFFIXES, read_table
 from caster_gym.tables import Quantity, Table, note, note_left_out
 from caster_gym.units import unlikely_radians
-
-ZeroAxis: TypeAlias = Literal["x", "y"]
 
 PATH_SUFFIXES = (*TABLE_SUFFIXES, *PLANNER_SUFFIXES)
 
@@ -44,7 +42,6 @@ _QUANTITIES = {"time": TIME, **POINT, "heading": HEADING, "psi": Quantity("angle
 _DEGREES_OF_EARTH = ("lat", "latitude", "lon", "lng", "long", "longitude", "lat_deg", "lon_deg")
 _FITS, _DIFFERS = 0.2, 0.6  # [rad] mean difference from the direction of the way that says yes, and no
 _LEAST_QUATERNION = 0.1  # [-] length below which one was never set
-_CALM = 1.0  # [rad] from row to row: in between, angles that are wrapped jump by a turn
 _MANY = 10  # rows that show what is usual
 _GAP = 3.0  # [-] of the usual time between rows, from which on some are missing
 
@@ -91,18 +88,6 @@ def read_poses(path: Path, unit: AngleUnit | None = None, zero_axis: ZeroAxis | 
             f"{path} has no column of times; call it 'time [s]', or use the file as a path of shape 'spline'"
         )
     return _poses(table, unit, zero_axis)
-
-
-def unwrapped(angles: Array) -> Array:
-    """Angles [rad] as they stand, if some are beyond what wrapped ones are, else on the turn nearest to the one before.
-
-    Many angles from 0 to a turn are taken to be wrapped if they change little from row to row but for jumps of a turn.
-    """
-    steps = np.abs(np.diff(angles))
-    half = bool(np.abs(angles).max(initial=0.0) <= np.pi + 1e-6)
-    whole = bool(((angles >= -1e-6) & (angles <= 2.0 * np.pi + 1e-6)).all())
-    calm = len(angles) >= _MANY and bool(((steps < _CALM) | (steps > 2.0 * np.pi - _CALM)).all())
-    return np.asarray(np.unwrap(angles) if half or (whole and calm) else angles, dtype=np.float64)
 
 
 def _table_of(path: Path) -> Table:

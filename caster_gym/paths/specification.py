@@ -15,7 +15,6 @@ from caster_gym.configuration import LONGEST_VALUE, ConfigurationError, is_yaml,
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.angles import plain
 from caster_gym.paths.feasibility import check_feasible
-from caster_gym.paths.files import PATH_SUFFIXES, is_path_file, read_path_file
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse, Lemniscate, RoundedSquare
@@ -74,14 +73,16 @@ def _named(path: str | Path) -> AnyPath:
         if isinstance(content.get("file"), str):  # relative to the file in which it stands
             content["file"] = str(file.parent / Path(content["file"]).expanduser())
         return _read(content, f"{path}: path")
-    if is_path_file(file):
-        return _read(read_path_file(file), f"{path}: path")
-    if isinstance(path, Path) or file.suffix or len(file.parts) > 1:
+    if not (isinstance(path, Path) or file.suffix or len(file.parts) > 1):
+        return _read({"shape": path}, "path")
+    from caster_gym.paths.files import PATH_SUFFIXES, is_path_file, read_path_file  # late: most paths have no file
+
+    if not is_path_file(file):
         raise ConfigurationError(
             f"{str(path)!r} is no file of a path by its name: those end in .yaml, {', '.join(PATH_SUFFIXES)}; "
             f"shapes are {', '.join(sorted(_SHAPES))}"
         )
-    return _read({"shape": path}, "path")
+    return _read(read_path_file(file), f"{path}: path")
 
 
 def _brief(path: Any) -> str:

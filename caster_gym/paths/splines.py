@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
 
-from caster_gym.paths.angles import AngleUnit, plain, read_angles
-from caster_gym.paths.files import ZeroAxis, read_waypoints
+from caster_gym.paths.angles import AngleUnit, ZeroAxis, plain, read_angles
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.shapes import SIZES, Shape
 from caster_gym.paths.trajectory import LEAST_STEPS, Array, Trajectory, rounded_down, whole_steps
@@ -56,6 +55,8 @@ class Spline(Shape):
             if "waypoints" in content:
                 raise ValueError("give either 'waypoints' or a 'file' of them, not both")
             file, unit, zero_axis = Path(str(content["file"])), content.get("unit"), content.get("zero_axis")
+            from caster_gym.paths.files import read_waypoints  # late: most paths have no file
+
             return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest, "file": str(file)}
         waypoints = plain(content.get("waypoints"))
         if not isinstance(waypoints, list) or not all(isinstance(one, list) and len(one) == 3 for one in waypoints):

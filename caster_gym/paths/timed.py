@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen
-from caster_gym.paths.angles import AngleUnit, Rotation, plain, read_angles
-from caster_gym.paths.files import ZeroAxis, read_poses, unwrapped
+from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain, read_angles, unwrapped
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import (
     LEAST_STEPS,
@@ -58,6 +57,8 @@ class Timed(Frozen):
         if content.get("file") is not None:
             if "poses" in content:
                 raise ValueError("give either 'poses' or a 'file' of them, not both")
+            from caster_gym.paths.files import read_poses  # late: most paths have no file
+
             found = read_poses(Path(str(content["file"])), content.get("unit"), content.get("zero_axis"))
             rest = {key: value for key, value in content.items() if key != "unit"}
             return {**rest, **found, "file": str(content["file"])}
