@@ -248,6 +248,7 @@ def test_a_bound_that_holds_an_unknown_is_told_and_no_interval_given(loaded):
         (("payload_mass",), {"starts": {"weight": 1.0}}, "unknown quantity 'weight'"),
         (("payload_mass",), {"confidence": 1.0}, "confidence must lie between 0 and 1"),
         (("payload_mass",), {"window": -1.0}, "window must be positive, got -1 s"),
+        (("payload_mass",), {"window": 1e9}, r"window must be at most \S+ s, as the recording lasts, got 1e\+09 s"),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(loaded, names, options, words):

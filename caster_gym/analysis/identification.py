@@ -103,6 +103,9 @@ def identify(
     starts, width = dict(starts or {}), _quantile(confidence)
     if not window > 0.0:
         raise ValueError(f"the window must be positive, got {window:g} s")
+    lasts = recording.time_step * (len(recording.pose) - 1)
+    if window > max(lasts, WINDOW):
+        raise ValueError(f"the window must be at most {lasts:g} s, as the recording lasts, got {window:g} s")
     names = each_named(robot, names)
     check_names([*starts, *(bounds or {})], robot)
     chosen = unknowns(robot, names, starts, bounds)
