@@ -27,7 +27,6 @@ from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.mechanics.separation import Surroundings
-from caster_gym.paths.course import build_courses
 from caster_gym.paths.specification import AnyPath, build_trajectories, read_paths
 from caster_gym.paths.specification import PathLike as PathLike
 from caster_gym.robot import Robot, load_robot
@@ -112,6 +111,8 @@ def _track_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: Tr
 @lru_cache(maxsize=32)
 def _follow_plan(robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, task: FollowTask, longest: int | None) -> Plan:
     """The same for a following task."""
+    from caster_gym.paths.course import build_courses  # late: only those who follow need it
+
     courses = build_courses(paths, robot, task.speed_limit, task.free_heading, margin=task.margin)
     tables = tuple(course.samples for course in courses)
     samples, rows = joined(tables)
