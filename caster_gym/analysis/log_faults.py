@@ -21,6 +21,8 @@ _MOSTLY = 0.9  # [-] quantile of torques that stands for the greatest, without o
 _BEYOND_LIMITS = 5.0  # times the greatest torque of a motor
 _SURE = 10.0  # standard deviations of noise that a speed must gain
 
+# Suppressions below: mypy follows neither the fields that `replace` is given by name nor defaults of lambdas.
+
 
 def held_columns(recording: Recording) -> Finding | None:
     """Columns that are written less often than the rows come."""

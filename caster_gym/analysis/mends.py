@@ -22,6 +22,8 @@ _ONE_RATIO = 0.02  # [-] by which ratios of casters differ that are one
 _TORQUES_TOO = " (the torques with them, if those are in the same order)"
 _ALL_ORDERS = 4  # casters, beyond which columns are only swapped in pairs
 
+# Suppressions below: mypy follows neither the fields that `replace` is given by name nor defaults of lambdas.
+
 
 class Mend(NamedTuple):
     """One mistake and its mend."""
