@@ -24,8 +24,8 @@ def directions(steering):
 def test_ground_forces_are_the_constraint_forces_of_kanes_equations(robot):
     """(G1), (G2), (G3), (G4): wheel by wheel, the multipliers of the rolling constraints."""
     steering, twist, torque, wrench = random_motion(42, robot)
-    theirs = Kane(robot).contact_forces(steering, twist, torque, 0.0 * wrench)
-    ours = Model(robot).ground_forces(steering, twist, torque)
+    theirs = Kane(robot).contact_forces(steering, twist, torque, wrench)
+    ours = Model(robot).ground_forces(steering, twist, torque, wrench)
     assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * np.abs(theirs).max())  # two derivations in double precision
 
 
@@ -83,13 +83,63 @@ def test_wheel_loads_balance_weight_and_moments(caster_count):
         assert_allclose(balance[1:], weights[1:], atol=1e-7 * weights[0])  # the damping of the sharing, 1e-9 relative
 
 
-def test_a_lifted_wheel_counts_as_barely_loaded():
-    """A robot whose mass centre lies outside the triangle of its wheels: no load becomes negative or zero."""
+def test_a_robot_whose_mass_centre_lies_outside_its_wheels_tips_over():
+    """(G5): no three loads that press could balance it."""
     robot = random_robot(46, 3)
     platform = robot.platform.model_copy(update={"com": (-0.5, 0.3)})
     loads = Model(robot.model_copy(update={"platform": platform})).wheel_loads([0.0, 0.0, 0.0])
-    mass = platform.mass + sum(caster.wheel.mass + caster.link.mass for caster in robot.casters)
-    assert_allclose(loads.min(), 1e-3 * mass * GRAVITY / 3, rtol=1e-12)  # the least load, a thousandth of the mean
+    assert loads.min() < 0.0
+
+
+@pytest.mark.parametrize("caster_count", [4, 5, 6])
+def test_a_wheel_that_would_be_pulled_down_lifts_and_the_others_carry(caster_count):
+    """(G5): against nonnegative least squares, which knows of no sharing rule but the least sum of squares."""
+    robot = random_robot(47, caster_count)
+    lifted = 0
+    for seed in range(40):
+        steering, twist, torque, wrench = random_motion(seed, robot)
+        platform = robot.platform.model_copy(update={"height": 0.3})
+        tall = robot.model_copy(update={"platform": platform})
+        loads = Model(tall).wheel_loads(steering, twist, torque, 3.0 * wrench)
+        if (loads < 0.0).any():
+            continue  # it tips over
+        centres = [
+            wheel_centre(f, c) for f, c in zip(directions(steering), robot_parameters(tall).casters, strict=True)
+        ]
+        contacts = np.array([(1.0, x, y) for x, y in centres]).T
+        balance = contacts @ loads
+        weight = robot.platform.mass + sum(caster.wheel.mass + caster.link.mass for caster in robot.casters)
+        assert_allclose(balance[0], weight * GRAVITY, rtol=1e-6)  # the damping of the sharing
+        down = loads > 0.0
+        lifted += not down.all()
+        shares = np.linalg.lstsq(contacts[:, down], balance, rcond=None)[0]
+        assert_allclose(loads[down], shares, rtol=0.0, atol=1e-5 * balance[0])  # as above
+    assert lifted > 3
+
+
+@pytest.mark.parametrize("caster_count", [3, 4, 6])
+def test_loads_of_a_moving_robot_turn_its_momentum(caster_count):
+    """(G7): gravity, loads and push change the spin of all bodies about the floor; against Kane's bodies in space."""
+    robot = random_robot(52, caster_count)
+    robot = robot.model_copy(update={"platform": robot.platform.model_copy(update={"height": 0.23})})
+    model, parameters, platform = Model(robot), robot_parameters(robot), robot.platform
+    shifts = []
+    for seed in range(20):
+        steering, twist, torque, wrench = random_motion(seed, robot)
+        loads = model.wheel_loads(steering, twist, torque, wrench)
+        rate = model.forward_dynamics(steering, twist, torque, wrench)
+        _, moment = Kane(robot).momentum_rates(steering, twist, rate)
+        ours = GRAVITY * platform.mass * np.array([-platform.com[1], platform.com[0]])
+        ours += platform.height * np.array([-wrench[1], wrench[0]])
+        for f, caster, n in zip(directions(steering), parameters.casters, loads, strict=True):
+            (x_w, y_w), (x_l, y_l) = wheel_centre(f, caster), link_mass_centre(f, caster)
+            ours += GRAVITY * (
+                caster.wheel_mass * np.array([-y_w, x_w]) + caster.link_mass * np.array([-y_l, x_l])
+            ) + n * np.array([y_w, -x_w])
+        scale = GRAVITY * platform.mass  # N m at an arm of 1 m
+        assert_allclose(ours, moment[:2], rtol=0.0, atol=1e-6 * scale)  # the damping of the sharing
+        shifts.append(np.abs(loads - model.wheel_loads(steering)).max() / scale)
+    assert np.median(shifts) > 1e-2  # enough to be seen
 
 
 def test_a_symmetric_robot_stands_equally_on_its_wheels():
@@ -114,5 +164,6 @@ def test_two_wheels_share_the_weight_though_they_cannot_balance_it():
 
 def test_traction_use_is_the_share_of_the_friction_cone():
     """(G6)."""
-    assert_allclose(traction_use((3.0, -4.0), 10.0, 0.5), 1.0, rtol=1e-15)
-    assert traction_use((0.0, 0.0), 10.0, 0.5) == 0.0
+    assert_allclose(traction_use((3.0, -4.0), 10.0, 0.1, 0.5), 1.0, rtol=1e-15)
+    assert traction_use((0.0, 0.0), 10.0, 0.1, 0.5) == 0.0
+    assert_allclose(traction_use((3.0, -4.0), 0.0, 0.1, 0.5), 100.0, rtol=1e-15)  # lifted

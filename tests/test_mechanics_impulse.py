@@ -174,6 +174,7 @@ def test_a_mirrored_impact_has_the_mirrored_impulse():
                 "y": -c.y,
                 "offset": -c.offset,
                 "link": c.link.model_copy(update={"com": (c.link.com[0], -c.link.com[1])}),
+                "gear": ((c.gear[0][0], -c.gear[0][1]), (-c.gear[1][0], c.gear[1][1])),  # steering turns the other way
             }
         )
         for c in model.robot.casters

@@ -77,8 +77,8 @@ class Model:
     ) -> Array:
         """Twist rate (..., 3): derivative of the components of the twist in B. wrench (..., 3) acts at C, in B."""
         directions, v = self._directions(steering), self._vector("twist", twist)
-        force = (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
-        return self._stack(dynamics.forward_dynamics(v, directions, self._torques(torque), force, self._parameters))
+        force, torques = self._wrench(wrench), self._torques(torque)
+        return self._stack(dynamics.forward_dynamics(v, directions, torques, force, self._parameters))
 
     def inverse_dynamics(self, steering: ArrayLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
         """Generalised force (..., 3) at C, in B, that drives and wrench must supply together, friction included."""
@@ -92,17 +92,40 @@ class Model:
         directions, v = self._directions(steering), self._vector("twist", twist)
         return self._scalar(dynamics.kinetic_energy(v, directions, self._parameters))
 
-    def ground_forces(self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike) -> Array:
-        """Forces (..., N, 2) of the floor on each wheel along f and f⊥, under the given joint torques. [N]"""
+    def ground_forces(
+        self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike, wrench: ArrayLike | None = None
+    ) -> Array:
+        """Forces (..., N, 2) of the floor on each wheel along f and f⊥. [N]
+
+        Under joint torques and all else that pushes the robot: wrench (..., 3) at C, in B.
+        """
         directions, v, torques = self._directions(steering), self._vector("twist", twist), self._torques(torque)
-        v_rate = dynamics.forward_dynamics(v, directions, torques, (0.0, 0.0, 0.0), self._parameters)
+        v_rate = dynamics.forward_dynamics(v, directions, torques, self._wrench(wrench), self._parameters)
         shared = v, v_rate, self._parameters.platform.coulomb_speed
         forces = each(ground.ground_force, shared, directions, self._parameters.casters, torques)
         return self._stack([self._stack(force) for force in forces], -2)
 
-    def wheel_loads(self, steering: ArrayLike) -> Array:
-        """Normal forces (..., N) under the wheels of the robot at rest. [N]"""
-        return self._stack(ground.wheel_loads(self._directions(steering), self._parameters))
+    def wheel_loads(
+        self,
+        steering: ArrayLike,
+        twist: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Array:
+        """Normal forces (..., N) under the wheels: at rest, or of a robot that moves under torques and a wrench. [N]
+
+        The wrench (..., 3) at C, in B, acts at the height of the platform's mass centre. A wheel that lifts has no
+        load; a negative load says that the robot tips over.
+        """
+        directions = self._directions(steering)
+        if twist is None and torque is None and wrench is None:
+            return self._stack(ground.wheel_loads(directions, (0.0, 0.0), self._parameters))
+        v = (0.0, 0.0, 0.0) if twist is None else self._vector("twist", twist)
+        none = ((0.0, 0.0),) * self.robot.caster_count
+        torques, force = none if torque is None else self._torques(torque), self._wrench(wrench)
+        v_rate = dynamics.forward_dynamics(v, directions, torques, force, self._parameters)
+        tilted = ground.tilt(v, v_rate, directions, force, self._parameters)
+        return self._stack(ground.wheel_loads(directions, tilted, self._parameters))
 
     @property
     def characteristic_length(self) -> float:
@@ -221,6 +244,9 @@ class Model:
     def _vector(self, name: str, value: Any) -> Vector:
         x, y, z = self._components(name, value, 3)
         return x, y, z
+
+    def _wrench(self, wrench: Any) -> Vector:
+        return (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
 
     def _unit(self, angle: Any) -> Direction:
         return self._arrays.cos(angle), self._arrays.sin(angle)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from caster_gym.mechanics.contact_impulses import hold, press
 from caster_gym.mechanics.dynamics import forward_dynamics
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
+from caster_gym.mechanics.ground import FloorUse, floor_use
 from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, unit, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, add, anywhere, each, maximum, minimum, total, where
@@ -28,6 +29,8 @@ class Touch(NamedTuple):
     pressing: Scalar  # [N s] sum of all normal impulses
     point: tuple[Scalar, Scalar]  # [m] in W, where the last impact was; what it was before, if there was none
     impacts: Scalar  # how many faster than RESTING
+    asks: FloorUse  # the most that is asked of the floor at the start of a segment
+    held: Vector  # [N, N, N m] wrench of lasting contacts on the robot in the last segment, at C, in B
 
 
 def lift(state: State, hull: Hull, obstacles: Obstacles, first: Any, end: Any) -> tuple[State, Scalar]:
@@ -107,6 +110,8 @@ def land(
         touch.pressing + where(acted, hits.normal, 0.0 * jx),
         (where(struck, at[0], touch.point[0]), where(struck, at[1], touch.point[1])),
         touch.impacts + where(struck, 1.0 + 0.0 * jx, 0.0 * jx),
+        touch.asks,
+        touch.held,
     )
 
 
@@ -124,7 +129,8 @@ def guarded_step(
     """One step of h seconds like `rk4_step`, among the obstacles first … end − 1."""
     nothing = 0.0 * (state.twist[0] + h)
     left, trial, landing = h + nothing, h + nothing, nothing
-    touch = Touch((nothing, nothing), nothing, (nothing, nothing), nothing)
+    none = (nothing, nothing, nothing)
+    touch = Touch((nothing, nothing), nothing, (nothing, nothing), nothing, FloorUse(nothing, nothing), none)
     for i in range(SEGMENTS):
         lifted, nearest = lift(state, hull, obstacles, first, end)
         push, pressing = (nothing, nothing, nothing), nothing
@@ -141,8 +147,17 @@ def guarded_step(
         c, s = target.heading
         share = where(walks, trial, nothing)
         impulse = (share * (c * push[0] - s * push[1]), share * (s * push[0] + c * push[1]))
+        asks = floor_use(lifted.twist, lifted.directions, torques, add(wrench, push), robot)
         touch = Touch(
-            add(touch.impulse, impulse), touch.pressing + where(walks, pressing, nothing), touch.point, touch.impacts
+            add(touch.impulse, impulse),
+            touch.pressing + where(walks, pressing, nothing),
+            touch.point,
+            touch.impacts,
+            FloorUse(
+                where(walks, maximum(asks.traction, touch.asks.traction), touch.asks.traction),
+                where(walks, maximum(asks.lifted, touch.asks.lifted), touch.asks.lifted),
+            ),
+            each(where, (walks,), push, touch.held),
         )
         state = unpack_state(each(where, (walks,), pack_state(target), pack_state(state)))
         if anywhere(lands):

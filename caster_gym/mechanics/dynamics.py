@@ -20,54 +20,44 @@ def caster_inertias(caster: CasterParameters) -> tuple[Scalar, Scalar, Scalar]:
 
 def caster_inertia(f: Direction, caster: CasterParameters) -> Symmetric:
     """Contribution of one caster to M."""
-    eta, theta, delta = rate_rows(f, caster)
+    eta, theta, _ = rate_rows(f, caster)
     i_tt, i_te, i_ee = caster_inertias(caster)
-    j = caster.steer_armature
-    # (D3): column sums first, then the symmetric product
-    t = (i_tt * theta[0] + i_te * eta[0], i_tt * theta[1] + i_te * eta[1], i_tt * theta[2] + i_te * eta[2])
-    e = (i_te * theta[0] + i_ee * eta[0], i_te * theta[1] + i_ee * eta[1], i_te * theta[2] + i_ee * eta[2])
+    j, k = caster.steer_armature, caster.cross_armature
+    te, ee = i_te + k, i_ee + j  # δ̇ = η̇ − ω: armatures act on η̇ and ω
+    # (D3): momenta of θ, η and ω for each unit of the twist, then the symmetric product
+    t = (i_tt * theta[0] + te * eta[0], i_tt * theta[1] + te * eta[1], i_tt * theta[2] + te * eta[2] - k)
+    e = (te * theta[0] + ee * eta[0], te * theta[1] + ee * eta[1], te * theta[2] + ee * eta[2] - j)
+    w = (-k * theta[0] - j * eta[0], -k * theta[1] - j * eta[1], j - k * theta[2] - j * eta[2])
     return (
-        t[0] * theta[0] + e[0] * eta[0] + j * delta[0] * delta[0],
-        t[0] * theta[1] + e[0] * eta[1] + j * delta[0] * delta[1],
-        t[0] * theta[2] + e[0] * eta[2] + j * delta[0] * delta[2],
-        t[1] * theta[1] + e[1] * eta[1] + j * delta[1] * delta[1],
-        t[1] * theta[2] + e[1] * eta[2] + j * delta[1] * delta[2],
-        t[2] * theta[2] + e[2] * eta[2] + j * delta[2] * delta[2],
+        t[0] * theta[0] + e[0] * eta[0],
+        t[0] * theta[1] + e[0] * eta[1],
+        t[0] * theta[2] + e[0] * eta[2] + w[0],
+        t[1] * theta[1] + e[1] * eta[1],
+        t[1] * theta[2] + e[1] * eta[2] + w[1],
+        t[2] * theta[2] + e[2] * eta[2] + w[2],
     )
 
 
-def caster_bias(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
-    """Contribution of one caster to h."""
-    row_eta, row_theta, row_delta = rate_rows(f, caster)
+def bias_forces(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
+    """Forces b at θ, η and ω that one caster takes at constant twist. [N m]"""
     eta, theta, _ = rates(v, f, caster)
-    e_eta, e_theta, e_delta = rate_drifts(v, f, caster)
+    e_eta, e_theta, _ = rate_drifts(v, f, caster)
     i_tt, i_te, i_ee = caster_inertias(caster)
+    j, k = caster.steer_armature, caster.cross_armature
+    te, ee = i_te + k, i_ee + j
     n = caster.off_axis * caster.link_mass * caster.radius * (caster.trail - caster.link_behind)
     n_theta, n_eta = -n * eta * eta, n * theta * eta  # (D1)
-    b_theta = i_tt * e_theta + i_te * e_eta + n_theta  # (D2)
-    b_eta = i_te * e_theta + i_ee * e_eta + n_eta
-    b_delta = caster.steer_armature * e_delta
-    return combine(row_theta, b_theta, row_eta, b_eta, row_delta, b_delta)  # (D4)
+    b_theta = i_tt * e_theta + te * e_eta + n_theta  # (D2)
+    b_eta = te * e_theta + ee * e_eta + n_eta
+    return b_theta, b_eta, -k * e_theta - j * e_eta
 
 
-def caster_resistance(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
-    """Generalised force that friction in one caster's joints and contact patch takes from the platform."""
-    row_eta, row_theta, row_delta = rate_rows(f, caster)
+def friction_forces(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
+    """Forces at θ, η and ω that overcome the friction of one caster's joints and contact patch. [N m]"""
     eta, theta, delta = rates(v, f, caster)
     roll = joint_friction(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed)
     steer = joint_friction(delta, caster.steer_viscous, caster.steer_coulomb, coulomb_speed)
-    return combine(row_theta, roll, row_eta, caster.scrub * eta, row_delta, steer)
-
-
-def caster_drive(f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]) -> Vector:
-    """Generalised force of the torques at one caster's rolling and steering joints."""
-    _, theta, delta = rate_rows(f, caster)
-    roll, steer = torque
-    return (
-        theta[0] * roll + delta[0] * steer,
-        theta[1] * roll + delta[1] * steer,
-        theta[2] * roll + delta[2] * steer,
-    )
+    return roll, caster.scrub * eta + steer, -steer
 
 
 def joint_friction(rate: Scalar, viscous: Scalar, coulomb: Scalar, coulomb_speed: Scalar) -> Scalar:
@@ -75,13 +65,40 @@ def joint_friction(rate: Scalar, viscous: Scalar, coulomb: Scalar, coulomb_speed
     return viscous * rate + coulomb * rate / sqrt(rate * rate + coulomb_speed * coulomb_speed)
 
 
-def combine(g: Vector, x: Scalar, h: Vector, y: Scalar, k: Vector, z: Scalar) -> Vector:
-    """g x + h y + k z."""
+def at_platform(f: Direction, caster: CasterParameters, forces: Vector) -> Vector:
+    """Generalised force at C of forces at one caster's θ and η and at ω."""
+    eta, theta, _ = rate_rows(f, caster)
+    x, y, z = forces
     return (
-        g[0] * x + h[0] * y + k[0] * z,
-        g[1] * x + h[1] * y + k[1] * z,
-        g[2] * x + h[2] * y + k[2] * z,
+        theta[0] * x + eta[0] * y,
+        theta[1] * x + eta[1] * y,
+        theta[2] * x + eta[2] * y + z,
     )
+
+
+def caster_bias(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
+    """Contribution of one caster to h."""
+    return at_platform(f, caster, bias_forces(v, f, caster))  # (D4)
+
+
+def caster_resistance(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
+    """Generalised force that friction in one caster's joints and contact patch takes from the platform."""
+    return at_platform(f, caster, friction_forces(v, coulomb_speed, f, caster))
+
+
+def caster_drive(f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]) -> Vector:
+    """Generalised force of the torques at one caster's rolling and steering joints."""
+    roll, steer = torque
+    return at_platform(f, caster, (roll, steer, -steer))
+
+
+def caster_force(
+    v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]
+) -> Vector:
+    """What is left of one caster's drive after its friction and its contribution to h."""
+    b, lost = bias_forces(v, f, caster), friction_forces(v, coulomb_speed, f, caster)
+    roll, steer = torque
+    return at_platform(f, caster, (roll - lost[0] - b[0], steer - lost[1] - b[1], -steer - lost[2] - b[2]))
 
 
 def platform_inertia(platform: PlatformParameters) -> Symmetric:
@@ -112,13 +129,6 @@ def resistance(v: Vector, directions: tuple[Direction, ...], robot: RobotParamet
     return total(each(caster_resistance, (v, robot.platform.coulomb_speed), directions, robot.casters))
 
 
-def drive_force(
-    directions: tuple[Direction, ...], torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters
-) -> Vector:
-    """Generalised force Σ (g_θ τ_θ + g_δ τ_δ) of all joint torques."""
-    return total(each(caster_drive, (), directions, robot.casters, torques))
-
-
 def forward_dynamics(
     v: Vector,
     directions: tuple[Direction, ...],
@@ -127,14 +137,9 @@ def forward_dynamics(
     robot: RobotParameters,
 ) -> Vector:
     """Twist rate under joint torques (rolling, steering) per caster and an external wrench at C. (D5)"""
-    drive = drive_force(directions, torques, robot)
-    h = bias(v, directions, robot)
-    lost = resistance(v, directions, robot)
-    force = (
-        drive[0] + wrench[0] - h[0] - lost[0],
-        drive[1] + wrench[1] - h[1] - lost[1],
-        drive[2] + wrench[2] - h[2] - lost[2],
-    )
+    push = total(each(caster_force, (v, robot.platform.coulomb_speed), directions, robot.casters, torques))
+    h = platform_bias(v, robot.platform)
+    force = (push[0] + wrench[0] - h[0], push[1] + wrench[1] - h[1], push[2] + wrench[2] - h[2])
     return solve(inertia(directions, robot), force)
 
 
