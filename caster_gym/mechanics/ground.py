@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, rate_rows, rates, wheel_centre
+from caster_gym.mechanics.caster import link_mass_centre, pivot_velocity, rates, wheel_centre
 from caster_gym.mechanics.dynamics import forward_dynamics, joint_friction
-from caster_gym.mechanics.linear import dot, solve
+from caster_gym.mechanics.linear import solve
 from caster_gym.mechanics.parameters import GRAVITY, CasterParameters, PlatformParameters, RobotParameters
 from caster_gym.mechanics.scalars import (
     Direction,
@@ -44,17 +44,12 @@ class FloorUse(NamedTuple):
 
 def joint_motion(v: Vector, v_rate: Vector, f: Direction, caster: CasterParameters) -> JointMotion:
     """How one caster moves with the robot."""
-    row_eta, row_theta, row_delta = rate_rows(f, caster)
+    a, b = pivot_velocity(v, f, caster)
     eta, theta, delta = rates(v, f, caster)
-    e_eta, e_theta, e_delta = rate_drifts(v, f, caster)
-    return JointMotion(
-        eta,
-        theta,
-        delta,
-        dot(row_eta, v_rate) + e_eta,
-        dot(row_theta, v_rate) + e_theta,
-        dot(row_delta, v_rate) + e_delta,
-    )
+    along, across = pivot_velocity(v_rate, f, caster)  # the components of an acceleration are found like a velocity's
+    eta_rate = (across - a * delta) / caster.trail  # (K4)
+    theta_rate = (along + b * delta - caster.offset * eta_rate) / caster.radius
+    return JointMotion(eta, theta, delta, eta_rate, theta_rate, eta_rate - v_rate[2])
 
 
 def link_acceleration(moves: JointMotion, caster: CasterParameters) -> tuple[Scalar, Scalar]:
