@@ -55,6 +55,7 @@ TORQUES = read_features(
         "effort",
         "smoothness",
         "traction_use",
+        "wheels_lifted",
         "impact",
     ]
 )

@@ -54,7 +54,8 @@ class CasterTrackEnv(CasterEnv):
     | reward_terms | the terms above, by name | – |
     | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
     | power | mean mechanical power of all motors over the control period | W |
-    | traction_use | largest share of the floor's friction that a wheel uses by the torques; above 1 it slips | – |
+    | traction_use | greatest share of the floor's friction that a wheel uses in the period; above 1 it would slip | – |
+    | wheels_lifted | most wheels at once that a push, an acceleration or a load lifts off the floor | – |
     | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |
     | pose, reference_pose | x, y, cos β, sin β in W | m, – |
     | progress, progress_share | 0 in this task | m, – |

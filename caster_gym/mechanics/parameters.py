@@ -127,11 +127,16 @@ def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamic
 
 
 def with_load(
-    platform: PlatformParameters, mass: Scalar, x: Scalar, y: Scalar, inertia: Scalar = 0.0, height: Scalar = 0.0
+    platform: PlatformParameters,
+    mass: Scalar,
+    x: Scalar,
+    y: Scalar,
+    inertia: Scalar = 0.0,
+    height: Scalar | None = None,
 ) -> PlatformParameters:
     """A platform and a load of a mass [kg] at (x, y) in B [m], with an inertia about its own mass centre [kg m²].
 
-    height: of the load's mass centre above the floor. [m]
+    height: of the load's mass centre above the floor [m]; None: as high as the platform's.
     """
     together = platform.mass + mass
     away_x, away_y = x - platform.com_x, y - platform.com_y
@@ -141,7 +146,7 @@ def with_load(
         inertia=platform.inertia + inertia + apart,
         com_x=platform.com_x + mass / together * away_x,
         com_y=platform.com_y + mass / together * away_y,
-        height=platform.height + mass / together * (height - platform.height),
+        height=platform.height if height is None else platform.height + mass / together * (height - platform.height),
     )
 
 
