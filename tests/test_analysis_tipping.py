@@ -40,7 +40,7 @@ def test_a_floor_that_holds_less_lets_a_robot_lift_less():
 
 
 def test_a_robot_that_lifts_is_warned_of_and_shipped_ones_are_not():
-    with pytest.warns(LiftWarning, match=r"'xr4000', .* 0.35 m above the floor, lifts wheel \d .* wheels_lifted"):
+    with pytest.warns(LiftWarning, match=r"'xr4000', .* 0.35 m above the floor, lifts wheel \d .*wheels_lifted"):
         CasterTrackEnv(standing("xr4000", 0.35))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
