@@ -55,7 +55,6 @@ TORQUES = read_features(
         "effort",
         "smoothness",
         "traction_use",
-        "wheels_lifted",
         "impact",
     ]
 )
