@@ -125,7 +125,7 @@ def pressed(angle, beta=0.4):
 
 @pytest.mark.parametrize("mu", [0.0, 0.2])
 def test_a_robot_slides_along_a_wall_as_one_that_is_tied_to_it(mu):
-    """(O7): the error falls in proportion to the time step. Pushed at 45°, with friction slower but not stuck."""
+    """(O10): the error falls in proportion to the time step. Pushed at 45°, with friction slower but not stuck."""
     robot, row, torque = pressed(-np.pi / 4)
     model, duration = Model(robot), 0.4
     # friction needs a direction from the start

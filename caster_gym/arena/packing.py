@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from caster_gym.arena.arena import Arena
 from caster_gym.arena.outlines import Outline, convex
+from caster_gym.mechanics.impulse import LAWS
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.robot import Robot
 
@@ -34,15 +35,15 @@ def hull_from(outline: Outline) -> Hull:
 def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
     """All obstacles of some arenas in one table, and the first and the end (arenas, 2) of those of each.
 
-    The arenas share one restitution and one friction. Obstacles are in the order of `Arena.obstacles`.
+    The arenas share one restitution, one friction and one law of impacts. Obstacles are in the order of `Arena.obstacles`.
     """
     if not arenas:
         raise ValueError("at least one arena is needed, got none")
     if any(arena.beside is not None for arena in arenas):
         raise ValueError("obstacles beside a path have no place before they are drawn: call draw_beside first")
-    bounces = {(arena.restitution, arena.friction) for arena in arenas}
+    bounces = {(arena.restitution, arena.friction, arena.impact_law) for arena in arenas}
     if len(bounces) > 1:
-        raise ValueError(f"arenas in one table must share restitution and friction, got {sorted(bounces)}")
+        raise ValueError(f"arenas in one table must share restitution, friction and impact_law, got {sorted(bounces)}")
     outlines = [[one.outline for _, one in arena.obstacles] for arena in arenas]
     everything = [outline for those in outlines for outline in those]
     obstacles = Obstacles(
@@ -54,6 +55,7 @@ def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
         ),
         restitution=arenas[0].restitution,
         friction=arenas[0].friction,
+        law=LAWS[arenas[0].impact_law],
     )
     return obstacles, _spans([len(those) for those in outlines])
 

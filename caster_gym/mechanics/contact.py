@@ -9,7 +9,7 @@ bounded, and the robot only ever moves to where it has been found free: what tim
 from typing import Any, NamedTuple
 
 from caster_gym.mechanics.contact_impulses import hold, press
-from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.dynamics import forward_dynamics, inertia
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
 from caster_gym.mechanics.ground import FloorUse, floor_use
 from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, unit, unpack_state
@@ -74,13 +74,13 @@ def holding_force(
     first: Any,
     end: Any,
 ) -> tuple[Vector, Scalar]:
-    """Wrench in B of lasting contacts that keeps them from approaching over h seconds, and its normal impulse. (O7)"""
+    """Wrench in B of lasting contacts that keeps them from approaching over h seconds, and its normal impulse. (O10)"""
     v = state.twist
     a = forward_dynamics(v, state.directions, torques, wrench, robot)
     free = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     c, s = state.heading
     heading = unit((c - s * v[2] * h, s + c * v[2] * h))
-    held, normal = hold(free, state, heading, robot, hull, obstacles, first, end)
+    held, normal = hold(free, state, heading, inertia(state.directions, robot), hull, obstacles, first, end)
     rate = 1.0 / maximum(h, 1e-9)
     return (held[0] * rate, held[1] * rate, held[2] * rate), normal
 
@@ -97,7 +97,7 @@ def land(
     end: Any,
 ) -> tuple[State, Touch]:
     """State and record after the impulses on those who land."""
-    bounced, hits = press(state, restitution, robot, hull, obstacles, first, end)
+    bounced, hits = press(state, inertia(state.directions, robot), restitution, hull, obstacles, first, end)
     twist = each(where, (lands,), bounced, state.twist)
     c, s = state.heading
     jx, jy = c * hits.wrench[0] - s * hits.wrench[1], s * hits.wrench[0] + c * hits.wrench[1]
