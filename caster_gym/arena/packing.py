@@ -35,7 +35,7 @@ def hull_from(outline: Outline) -> Hull:
 def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
     """All obstacles of some arenas in one table, and the first and the end (arenas, 2) of those of each.
 
-    The arenas share one restitution, one friction and one law of impacts. Obstacles are in the order of `Arena.obstacles`.
+    The arenas share restitution, friction and the law of impacts. Obstacles are in the order of `Arena.obstacles`.
     """
     if not arenas:
         raise ValueError("at least one arena is needed, got none")

@@ -171,9 +171,7 @@ class Blow(NamedTuple):
     normal: Scalar  # [N s] sum of all normal impulses
 
 
-def strike_alone(
-    v: Vector, table: Any, count: int, restitution: Scalar, obstacles: Obstacles
-) -> tuple[Blow, Scalar]:
+def strike_alone(v: Vector, table: Any, count: int, restitution: Scalar, obstacles: Obstacles) -> tuple[Blow, Scalar]:
     """The one contact that approaches struck by the law of a single contact; and whether another approaches then."""
     nothing = 0.0 * v[0]
     after, wrench, normal = v, (nothing, nothing, nothing), nothing
