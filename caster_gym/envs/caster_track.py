@@ -61,6 +61,7 @@ class CasterTrackEnv(CasterEnv):
     | progress, progress_share | 0 in this task | m, – |
     | clearance | gap to the nearest obstacle; inf where there is none | m |
     | impacts | number of impacts faster than 1 cm/s in the control period | – |
+    | impact_traction | largest share of the floor's friction that a wheel uses in one of them; above 1 it slips | – |
     | normal_impulse | sum of all normal impulses of obstacles, of impacts and of lasting contacts | N s |
     | impulse | sum of the impulses of obstacles on the robot, in W | N s |
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
