@@ -41,9 +41,12 @@ def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
         raise ValueError("at least one arena is needed, got none")
     if any(arena.beside is not None for arena in arenas):
         raise ValueError("obstacles beside a path have no place before they are drawn: call draw_beside first")
-    bounces = {(arena.restitution, arena.friction, arena.impact_law) for arena in arenas}
+    bounces = {(arena.restitution, arena.friction) for arena in arenas}
     if len(bounces) > 1:
-        raise ValueError(f"arenas in one table must share restitution, friction and impact_law, got {sorted(bounces)}")
+        raise ValueError(f"arenas in one table must share restitution and friction, got {sorted(bounces)}")
+    laws = {arena.impact_law for arena in arenas}
+    if len(laws) > 1:
+        raise ValueError(f"arenas in one table must share impact_law, got {', '.join(sorted(laws))}")
     outlines = [[one.outline for _, one in arena.obstacles] for arena in arenas]
     everything = [outline for those in outlines for outline in those]
     obstacles = Obstacles(
