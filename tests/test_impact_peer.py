@@ -1,5 +1,7 @@
 """Impacts against MuJoCo, whose wheels roll or slip by the friction of its floor."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,14 @@ def test_the_walls_spring_has_our_restitution():
         v -= h * force()
         x += h * v
     assert -v == pytest.approx(RESTITUTION, rel=1e-3)  # of first order in a step of a hundred thousandth
+
+
+def test_the_page_of_the_equations_shows_the_published_table():
+    docs = Path(__file__).parents[1] / "docs"
+    published = (docs / "truth" / "impacts.md").read_text(encoding="utf-8")
+    rows = [line for line in published.splitlines() if line.startswith("| ")]
+    assert len(rows) == 4
+    assert "\n".join(rows[1:]) in (docs / "equations.md").read_text(encoding="utf-8")
 
 
 def test_page_tells_what_was_compared(tmp_path):
