@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.mechanics.caster import link_mass_centre, wheel_centre
-from caster_gym.mechanics.ground import ground_force, traction_use
+from caster_gym.mechanics.ground import floor_impulse, ground_force, impact_traction, traction_use
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from tests.kane import Kane
 from tests.random_robots import CASTER_COUNTS, random_motion, random_robot
@@ -167,3 +167,37 @@ def test_traction_use_is_the_share_of_the_friction_cone():
     assert_allclose(traction_use((3.0, -4.0), 10.0, 0.1, 0.5), 1.0, rtol=1e-15)
     assert traction_use((0.0, 0.0), 10.0, 0.1, 0.5) == 0.0
     assert_allclose(traction_use((3.0, -4.0), 0.0, 0.1, 0.5), 100.0, rtol=1e-15)  # lifted
+
+
+@pytest.mark.parametrize("caster_count", [2, 3, 4, 5])
+def test_floor_impulses_are_those_of_kanes_bodies(caster_count):
+    """(G8): an impulse on a robot at rest is a push of one second whose acceleration has no time to become motion."""
+    for seed in range(10):
+        robot = random_robot(seed, caster_count)
+        steering, _, _, push = random_motion(seed, robot)
+        change = np.linalg.solve(Model(robot).inertia(steering), push)
+        pairs = zip(directions(steering), robot_parameters(robot).casters, strict=True)
+        ours = np.array([floor_impulse(tuple(change), f, caster) for f, caster in pairs])
+        theirs = Kane(robot).contact_forces(steering, np.zeros(3), np.zeros(2 * caster_count), push)
+        assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * np.abs(theirs).max())  # two derivations
+        outside = push.copy()
+        for f, caster, (along, across) in zip(directions(steering), robot_parameters(robot).casters, ours, strict=True):
+            x, y = wheel_centre(f, caster)
+            fx, fy = along * f[0] - across * f[1], along * f[1] + across * f[0]
+            outside += [fx, fy, x * fy - y * fx]
+        momentum = Kane(robot).momentum_rate(steering, np.zeros(3), change)  # Newton's law for the whole robot
+        assert_allclose(outside, momentum, rtol=0.0, atol=1e-9 * np.abs(momentum).max())
+
+
+@pytest.mark.parametrize(("name", "speed"), [("tidybot2", 0.013), ("xr4000", 0.058), ("chung2008", 0.44)])
+def test_impacts_soon_ask_more_than_the_floor_has(name, speed):
+    """(G9): head-on at this speed with e = 0.5 every second robot slips, steered and hit at random."""
+    robot, rng, count = load_robot(name), np.random.default_rng(53), 2000
+    steering, angle = rng.uniform(-np.pi, np.pi, (count, robot.caster_count)), rng.uniform(-np.pi, np.pi, count)
+    ahead = np.stack((np.cos(angle), np.sin(angle)), -1)
+    twist = speed * np.column_stack((ahead, np.zeros(count)))
+    _, after = Model(robot).collide(steering, twist, np.zeros((count, 2)), -ahead, 0.5)
+    wheels = tuple((np.cos(a), np.sin(a)) for a in steering.T)
+    uses = impact_traction(tuple((after - twist).T), wheels, robot_parameters(robot))
+    assert robot.floor_friction == 0.7
+    assert_allclose(np.median(uses), 1.0, rtol=0.05)  # speeds are rounded to two digits

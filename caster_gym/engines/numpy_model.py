@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.contact import guarded_step
+from caster_gym.mechanics.impulse import ImpactLaw
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
@@ -150,12 +151,17 @@ class Model:
         normal: ArrayLike,
         restitution: ArrayLike,
         friction: ArrayLike = 0.0,
+        law: ImpactLaw = "stronge",
     ) -> tuple[Array, Array]:
         """Impulse (..., 2), normal and tangential [N s], and the twist (..., 3) after an impact.
 
         point (..., 2) [m] and normal (..., 2), a unit vector from the obstacle into the robot, in B. The tangent is
-        the normal turned by +90°. Nothing happens at a contact that separates.
+        the normal turned by +90°. Nothing happens at a contact that separates. law: "stronge" integrates along the
+        impulse, with restitution of energy; "chatterjee_ruina" is algebraic, with restitution of velocity. Without
+        friction both are the same.
         """
+        if law not in impulse.LAWS:
+            raise ValueError(f"law must be one of {', '.join(impulse.LAWS)}, got {law!r}")
         p, n = self._components("point", point, 2), self._components("normal", normal, 2)
         length = n[0] * n[0] + n[1] * n[1]
         wrong = abs(length - 1.0) > 1e-6
@@ -164,7 +170,8 @@ class Model:
         e = self._in_range("restitution", restitution, 0.0, 1.0)
         mu = self._in_range("friction", friction, 0.0, float("inf"))
         directions, v = self._directions(steering), self._vector("twist", twist)
-        j_n, j_t, after = impulse.collide(v, directions, p, n, e, mu, self._parameters)
+        m = dynamics.inertia(directions, self._parameters)
+        j_n, j_t, after = impulse.collide(v, m, p, n, e, mu, impulse.LAWS[law])
         return self._stack((j_n, j_t)), self._stack(after)
 
     def simulate(

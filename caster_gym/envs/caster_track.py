@@ -61,9 +61,20 @@ class CasterTrackEnv(CasterEnv):
     | progress, progress_share | 0 in this task | m, – |
     | clearance | gap to the nearest obstacle; inf where there is none | m |
     | impacts | number of impacts faster than 1 cm/s in the control period | – |
+    | impact_traction | largest share of the floor's friction that a wheel uses in one of them; above 1 it slips | – |
     | normal_impulse | sum of all normal impulses of obstacles, of impacts and of lasting contacts | N s |
     | impulse | sum of the impulses of obstacles on the robot, in W | N s |
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
+
+    **Impacts** act through the whole inertia, as if the floor could keep the wheels from slipping whatever that takes.
+    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller. Head-on into a smooth wall at 0.5 m/s
+    with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
+
+    | robot | impact_traction | impulse here | MuJoCo's, whose wheels slip | sideways here | MuJoCo's |
+    |---|---|---|---|---|---|
+    | chung2008 | 1.0 | 4.7 N s | 4.7 N s | 0.05 m/s | 0.05 m/s |
+    | xr4000 | 8.4 | 68 N s | 54 N s | 0.05 m/s | 0.01 m/s |
+    | tidybot2 | 36 | 120 N s | 48 N s | 0.15 m/s | 0.02 m/s |
 
     **Endings** `terminated`: the robot left its corridor (0.5 m from the reference), its state stopped being finite,
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:

@@ -19,7 +19,7 @@ from caster_gym.envs.block_layout import (
     POSITION_ERROR,
     TOUCHED,
 )
-from caster_gym.envs.tracking import ASKS
+from caster_gym.envs.tracking import ASKS, IMPACT_TRACTION
 
 _TERMS = slice(FIRST_TERM, FIRST_POSE)
 _TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
@@ -55,6 +55,7 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any
         "clearance": row[FIRST_SITUATION + 2],
         "impacts": row[FIRST_RECORD + 6],
         "impulse": columns[_IMPULSE],
+        "impact_traction": row[FIRST_RECORD + IMPACT_TRACTION],
         "normal_impulse": row[FIRST_RECORD + 3],
         "left_corridor": left,
         "not_finite": unfinite,

@@ -104,6 +104,7 @@ class TorchSurroundings:
             self._spans,
             self._all.restitution,
             self._all.friction,
+            self._all.law,
         )
 
     def look(self, state: State, paths: Tensor, count: int) -> tuple[Tensor, tuple[Neighbour, ...]]:

@@ -38,6 +38,7 @@ YAW_ACCELERATION_UNIT = 4.0  # [rad/s²]
 GAP_UNIT = 0.25  # [m] to an obstacle
 GAP_LIMIT = 1.0  # [m] obstacles farther away look as if they were there
 ASKS = 7  # row of a Record from which on stands what was asked of the floor
+IMPACT_TRACTION = 12  # and the row of what impacts asked
 OBSERVATION_LIMIT = 20.0  # observed quantities are clipped here, far beyond what a robot in its corridor reaches
 
 Point: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
@@ -115,6 +116,7 @@ class Record(NamedTuple):
     held_x: Scalar  # [N, N, N m] wrench of lasting contacts on the robot at the end, at C, in B
     held_y: Scalar
     held_moment: Scalar
+    impact_traction: Scalar  # [-] greatest share of the floor's friction that a wheel used in an impact
 
 
 class Situation(NamedTuple):
@@ -224,6 +226,7 @@ def record_of(done: Record, drive: Drive, touch: Touch, share: Scalar) -> Record
         maximum(drive.asks.traction, done.traction),
         maximum(drive.asks.lifted, done.lifted),
         *touch.held,
+        maximum(touch.impact_traction, done.impact_traction),
     )
 
 

@@ -22,6 +22,7 @@ from caster_gym.mechanics.scalars import (
 
 LOAD_DAMPING = 1e-9  # [-] relative; decides the moments that two wheels cannot carry, invisible with three or more
 LEAST_LOAD = 1e-3  # [-] of the mean load: a lifted wheel counts as barely loaded
+CONTACT_TIME = 0.01  # [s] that an impact is taken to last
 
 
 class JointMotion(NamedTuple):
@@ -87,6 +88,16 @@ def ground_force(
     )  # (G3)
     across = -(h - steer + caster.scrub * moves.eta + s * along) / d  # (G4)
     return along, across
+
+
+def floor_impulse(change: Vector, f: Direction, caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    """Impulse of the floor on one wheel along f and f⊥ in an impact that changes the robot's twist. [N s]
+
+    What does not grow beyond bounds in an impact, torques, friction, and all that depends on the twist, leaves none.
+    """
+    nothing = 0.0 * change[0]
+    still = (nothing, nothing, nothing)
+    return ground_force(still, change, 1.0, f, caster, (nothing, nothing))  # (G8)
 
 
 def caster_tilt(v: Vector, v_rate: Vector, f: Direction, caster: CasterParameters) -> tuple[Scalar, Scalar]:
@@ -215,6 +226,18 @@ def floor_use(
     uses = each(wheel_use, (least, robot.platform.floor_friction), forces, loads)
     (lifted,) = total(each(lifts, (), loads))
     return FloorUse(greatest(uses), lifted)
+
+
+def impact_traction(change: Vector, directions: tuple[Direction, ...], robot: RobotParameters) -> Scalar:
+    """Greatest share of the floor's friction that a wheel uses in an impact that changes the robot's twist. [-]
+
+    Over the contact time, with loads at rest.
+    """
+    impulses = each(floor_impulse, (change,), directions, robot.casters)
+    loads = wheel_loads(directions, (0.0, 0.0), robot)
+    (whole,) = total(each(sole, (), loads))
+    shared = LEAST_LOAD * whole / len(loads), robot.platform.floor_friction * CONTACT_TIME
+    return greatest(each(wheel_use, shared, impulses, loads))  # (G9)
 
 
 def wheel_use(least: Scalar, floor_friction: Scalar, force: tuple[Scalar, Scalar], load: Scalar) -> Scalar:

@@ -72,4 +72,4 @@ def guarded_driven_step(
     torques = each(motor_torques, (), commands, before, robot.casters)
     at_joints = each(joint_torques, (), torques, robot.casters)
     end, touch = guarded_step(state, at_joints, wrench, h, robot, hull, obstacles, first, last)
-    return end, Drive(torques, power_between(before, torques, end, robot), touch.asks), touch
+    return end, Drive(torques, touch.work / h, touch.asks), touch
