@@ -95,6 +95,24 @@ def test_all_engines_agree_over_several_impacts(name):
     assert_allclose(tensors, numpy, rtol=0.0, atol=1e-8)
 
 
+def test_the_law_of_an_impact_reaches_compiled_code():
+    robot = robot_of(SHAPES["disc"])
+    states = with_directions(scattered(9, 30, around_it(robot, ROOM)))
+    ends = []
+    for law in ("stronge", "chatterjee_ruina"):
+        around = around_it(robot, {**ROOM, "impact_law": law}, 0.8, 0.6)
+        fleet = Fleet(robot, 30, around=around)
+        fleet.state = states
+        for _ in range(5):
+            fleet.step(np.zeros((30, 6)), 5e-3, 20)
+        angles = np.column_stack((states[:, :2], np.arctan2(states[:, 3], states[:, 2]), states[:, 4:7]))
+        wheels = np.arctan2(states[:, 8::2], states[:, 7::2])
+        walked = Model(robot).simulate(np.column_stack((angles, wheels)), np.zeros(6), 5e-3, 100, around)
+        assert_allclose(fleet.state, with_directions(walked[-1]), rtol=0.0, atol=1e-7)  # as above, for half a second
+        ends.append(fleet.state)
+    assert (np.abs(ends[0] - ends[1]).max(axis=1) > 1e-3).sum() > 5
+
+
 @pytest.mark.parametrize("name", ["disc", "triangle"])
 def test_one_robot_among_obstacles_equals_the_same_robot_in_a_batch(name):
     """To the last bit, in the compiled fleet."""

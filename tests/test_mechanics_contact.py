@@ -239,6 +239,26 @@ def test_a_robot_that_is_pushed_into_a_corner_comes_to_rest(e, mu):
     assert np.abs(walk.state.twist).max() < 1e-3  # casters still turn a little, against nothing but their inertia
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("outline", [0.1, TRIANGLE, BOX], ids=["disc", "triangle", "box"])
+def test_the_order_of_walls_does_not_matter_on_the_way(outline, mu):
+    """Thrown and pushed into a corner, for a second of impacts, sliding and rest."""
+    robot = shaped(load_robot("chung2008"), outline)
+    sides = [{"point": [-0.5, 0.0], "normal": [1.0, 0.0]}, {"point": [0.0, -0.5], "normal": [0.3, 1.0]}]
+    ends = []
+    for order in (sides, sides[::-1]):
+        around = around_it(robot, {"half_planes": order}, restitution=0.5, friction=mu)
+        start = floats(state_of(0.0, 0.0, 0.3, (-0.8, -0.9), 0.5, np.array([0.4, 1.9, -2.0])))
+        walk = Walk(robot, around, start, np.array([0.05, 0.02, -0.03, 0.01, 0.06, -0.01]))
+        for _ in range(200):
+            c, s = walk.state.heading
+            walk.wrench = (-6.0 * c - 5.0 * s, 6.0 * s - 5.0 * c, 0.0)  # (−6, −5) N in W
+            walk.step(5e-3)
+        ends.append([*walk.state.position, *walk.state.heading])
+        assert walk.impacts > 1
+    assert_allclose(ends[0], ends[1], rtol=0.0, atol=STILL)  # contacts are found still to that speed
+
+
 def test_numbers_that_are_not_finite_are_not_hidden_by_obstacles():
     """Far beyond the speeds that a step can follow, the robot is lost, not frozen where it was."""
     robot = load_robot("chung2008")

@@ -2,8 +2,8 @@
 
 Obstacles of different paths share a slot of the tables where they are of one kind (with faces, with corners, round);
 spare faces and corners repeat the last one, and a spare slot holds something far away. The slots keep the order in
-which each path lists its obstacles, in which impulses act. How robots step among obstacles depends on what they touch,
-so that this, alone in the Torch engine, waits for the device.
+which each path lists its obstacles. How robots step among obstacles depends on what they touch, so that this, alone in
+the Torch engine, waits for the device.
 """
 
 from typing import Any, NamedTuple

@@ -28,10 +28,11 @@ from caster_gym.mechanics.separation import TOUCH, Hull, Obstacles, contact_poin
 RESTING = 0.01  # [m/s] slower contacts do not bounce
 STILL = 1e-6  # [m/s] slower contacts do not approach
 ROUNDS = 8  # of impulses at one moment; nothing bounces in the last
-SWEEPS = 240  # over all contacts, at one moment
+SWEEPS = 400  # over all contacts, at one moment
 SETTLED, COARSE = 1e-9, 1e-6  # [m/s] changes at which sweeps end; the latter in single precision
-_STEP = 1.5  # of a sweep; below 1 none can overshoot, from 2 on all may
-_MOMENTUM, _MORE, _LATE = 0.3, 0.7, 80  # share of the last change that a sweep repeats, and more of it from sweep 80 on
+# Share of what all contacts together can bear that a sweep corrects, and share of its last change that it repeats: the
+# first settles nearly everything, the second what settles slowly, the third what sways.
+_SHARES, _LATER, _LAST = ((1.5, 0.3), (1.5, 0.7), (0.5, 0.7)), 80, 240
 _SAME = 1e-9  # [m] points of one obstacle that are nearer are one
 _TINY, _HUGE = 1e-30, 1e30
 
@@ -128,16 +129,16 @@ def settle(v: Vector, table: Any, count: int, friction: Scalar) -> Vector:
     settled = where((1.0 + nothing) + SETTLED > 1.0, SETTLED, COARSE)
     goes_on = nothing < 1.0  # a robot of a batch stops where it would stop alone
     for sweep in range(SWEEPS):
-        momentum = _MOMENTUM if sweep < _LATE else _MORE
+        share, momentum = _SHARES[0] if sweep < _LATER else _SHARES[1] if sweep < _LAST else _SHARES[2]
         changing, after = nothing > 1.0, v
         for j in range(count):
             one, at = contact_of(table, j), _FIELDS * j
             acts = goes_on & (table[at + _TOUCHES] > 0.5)
             along, across = table[at + _ALONG], table[at + _ACROSS]
-            j_n = along + momentum * table[at + _CHANGE_ALONG] - _STEP * dot(one.n, v) / table[at + _SCALE_ALONG]
+            j_n = along + momentum * table[at + _CHANGE_ALONG] - share * dot(one.n, v) / table[at + _SCALE_ALONG]
             j_n = clip(j_n, table[at + _LEAST], table[at + _MOST])
             limit = friction * j_n
-            j_t = across + momentum * table[at + _CHANGE_ACROSS] - _STEP * dot(one.t, v) / table[at + _SCALE_ACROSS]
+            j_t = across + momentum * table[at + _CHANGE_ACROSS] - share * dot(one.t, v) / table[at + _SCALE_ACROSS]
             j_t = clip(j_t, -limit, limit)
             d_n, d_t = where(acts, j_n - along, nothing), where(acts, j_t - across, nothing)
             table[at + _ALONG], table[at + _CHANGE_ALONG] = along + d_n, d_n
