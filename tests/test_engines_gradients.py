@@ -3,10 +3,13 @@
 import pytest
 import torch
 
+from caster_gym import load_robot
 from caster_gym.engines.torch_fleet import TorchFleet
+from caster_gym.engines.torch_model import TorchModel
 from caster_gym.envs.torch_task import TorchTask
 from caster_gym.mechanics.parameters import robot_parameters
 from tests.random_robots import random_robot
+from tests.walks import around_it, shaped
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
 STEP = 1e-6  # [-] of central differences: truncation of 1e-12 and rounding of 1e-10 for quantities of order 1
@@ -186,3 +189,21 @@ def test_through_an_impact(before_a_wall):
         (actions, lambda it: weighted(end(state.bodies, it))),
     ):
         assert_slope_agrees(function, at, step=1e-3, tolerance=5e-3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_through_contacts_that_are_struck_jointly(friction):
+    """A robot that touches two walls of a corner runs into both."""
+    robot = shaped(load_robot("chung2008"), 0.1)
+    corner = [{"point": [-0.1, 0.0], "normal": [1.0, 0.0]}, {"point": [0.0, -0.1], "normal": [0.3, 1.0]}]
+    corner[1]["point"] = [-0.1 * 0.3 / 1.09**0.5, -0.1 / 1.09**0.5]
+    around = around_it(robot, {"half_planes": corner}, restitution=0.5, friction=friction)
+    model = TorchModel(robot)
+    place, steering = torch.zeros(3, dtype=torch.float64), torch.tensor([0.4, 1.9, -2.0], dtype=torch.float64)
+
+    def end(twist):
+        state = torch.cat((place, twist, steering))
+        return weighted(model.simulate(state, torch.zeros(6, dtype=torch.float64), 1e-3, 1, around)[-1][3:6])
+
+    before = torch.tensor([-0.5, -0.4, 0.1], dtype=torch.float64)
+    assert_slope_agrees(end, before, tolerance=1e-5)  # sweeps end at changes of 1e-9, of which 1e-6 feels a thousandth
