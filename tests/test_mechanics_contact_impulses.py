@@ -158,6 +158,16 @@ def test_the_order_of_walls_does_not_matter(mu):
             assert_allclose(other.normal, pressure.normal, rtol=1e-6)
 
 
+def test_a_wall_that_is_listed_twice_is_one_wall():
+    for seed in SEEDS[::3]:
+        one = scene(seed)
+        after, pressure, _ = struck(one)
+        again, other, _ = struck(one, [0, *range(len(one.normals)), 0])
+        assert_allclose(again, after, rtol=0.0, atol=ORDER)
+        assert_allclose(other.normal, pressure.normal, rtol=1e-6)
+        assert_allclose(other.point, pressure.point, rtol=0.0, atol=ORDER)
+
+
 def mirrored(one):
     """The same scene seen in a mirror, left and right exchanged."""
     casters = tuple(

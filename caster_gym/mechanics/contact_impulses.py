@@ -33,7 +33,7 @@ SETTLED, COARSE = 1e-9, 1e-6  # [m/s] changes at which sweeps end; the latter in
 # Share of what all contacts together can bear that a sweep corrects, and share of its last change that it repeats: the
 # first settles nearly everything, the second what settles slowly, the third what sways.
 _SHARES, _LATER, _LAST = ((1.5, 0.3), (1.5, 0.7), (0.5, 0.7)), 80, 240
-_SAME = 1e-9  # [m] points of one obstacle that are nearer are one
+_SAME = 1e-9  # [m] contacts that are nearer are one
 _TINY, _HUGE = 1e-30, 1e30
 
 _FIELDS = 24  # of a contact: its rows, then
@@ -61,12 +61,19 @@ class Contact(NamedTuple):
     m_t: Vector
 
 
+def distance(one: Contact, other: Contact) -> Scalar:
+    """How far two contacts are from being the same, in place [m] and direction."""
+    far = absolute(one.n[0] - other.n[0]) + absolute(one.n[1] - other.n[1])
+    return far + absolute(one.n[2] - other.n[2]) + absolute(one.t[2] - other.t[2])
+
+
 def gather(
     state: State, heading: Direction, m: Symmetric, hull: Hull, obstacles: Obstacles, first: Any, end: Any
 ) -> tuple[Any, int]:
     """Both contact points of each obstacle that the robot touches, in the directions of `heading`, and their number.
 
-    A row of _FIELDS entries each; those of a batch where another robot touches are marked as not touching.
+    A row of _FIELDS entries each. Points that are there already, the second of a corner's for instance, are marked as
+    not touching, as are those of a batch where another robot touches.
     """
     nothing = 0.0 * state.position[0]
     table = memory(nothing, 2 * _FIELDS * (end - first))
@@ -79,9 +86,7 @@ def gather(
             continue
         normal = (c * apart.nx + s * apart.ny, c * apart.ny - s * apart.nx)
         points = contact_points(state.position, heading, apart, hull, obstacles, k)
-        width = absolute(points[1][0] - points[0][0]) + absolute(points[1][1] - points[0][1])
         for i in range(2):
-            acts = touching & ((width > _SAME) | (i == 0))
             n, t = contact_rows(points[i], normal)
             m_n, m_t = solve(m, n), solve(m, t)
             at = _FIELDS * count
@@ -89,8 +94,13 @@ def gather(
                 table[at + q], table[at + 3 + q] = n[q], t[q]
                 table[at + 6 + q], table[at + 9 + q] = m_n[q], m_t[q]
             table[at + _POINT], table[at + _POINT + 1] = points[i]
-            table[at + _TOUCHES] = where(acts, 1.0 + nothing, nothing)
+            table[at + _TOUCHES] = where(touching, 1.0 + nothing, nothing)
             count += 1
+    for j in range(count):
+        for k in range(j):
+            apart_by = distance(contact_of(table, j), contact_of(table, k))
+            again = (apart_by < _SAME) & (table[_FIELDS * k + _TOUCHES] > 0.5)
+            table[_FIELDS * j + _TOUCHES] = where(again, nothing, table[_FIELDS * j + _TOUCHES])
     for j in range(count):
         one, at = contact_of(table, j), _FIELDS * j
         along, across = nothing, nothing
