@@ -1,12 +1,16 @@
-"""(M1) to (M3): motors and the gear between them and the joints."""
+"""(M1) to (M4): motors and the gear between them and the joints."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from caster_gym import Model, load_robot
+from caster_gym.mechanics.integration import rk4_step
 from caster_gym.mechanics.motors import joint_torques, motor_ranges, motor_speeds, motor_torques, torque_range
 from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.mechanics.plant import driven_step
 from tests.random_robots import random_robot
+from tests.walks import floats, state_of, steering_of
 
 
 @pytest.fixture
@@ -82,3 +86,34 @@ def test_passive_motors_give_no_torque(driven):
         assert (steer != 0.0) == (driven == f"steer_{i}")
         for (low, high), torque in zip(motor_ranges((3.0, -4.0), caster), (roll, steer), strict=True):
             assert low <= torque <= high
+
+
+@pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
+def test_power_is_the_mean_of_torque_times_speed(name):
+    """(M2): against eighty fine steps under the same torques; off by the second order of the time step."""
+    robot = load_robot(name)
+    parameters, model, rng = robot_parameters(robot), Model(robot), np.random.default_rng(5)
+    gears = np.array([caster.gear for caster in robot.casters])
+
+    def speeds(state):
+        _, rolling, steering = model.rates(steering_of(state), np.array(state.twist))
+        return np.einsum("nij,nj->ni", gears, np.stack((rolling, steering), -1))
+
+    errors, sizes = [], []
+    for _ in range(10):
+        angles = rng.uniform(-np.pi, np.pi, robot.caster_count)
+        state = floats(state_of(0.0, 0.0, 0.0, rng.uniform(-0.7, 0.7, 2), rng.uniform(-1.0, 1.0), angles))
+        commands = tuple(map(tuple, rng.uniform(-1.0, 1.0, (robot.caster_count, 2)).tolist()))
+        for h in (4e-3, 2e-3):
+            _, drive = driven_step(state, commands, (0.0, 0.0, 0.0), h, parameters)
+            torques, now, powers = np.array(drive.torques), state, []
+            at_joints = tuple(map(tuple, np.einsum("nij,ni->nj", gears, torques).tolist()))
+            for _ in range(40):
+                middle = rk4_step(now, at_joints, (0.0, 0.0, 0.0), h / 80, parameters)
+                powers.append((torques * speeds(middle)).sum())
+                now = rk4_step(middle, at_joints, (0.0, 0.0, 0.0), h / 80, parameters)
+            errors.append(drive.power - np.mean(powers))
+            sizes.append(np.abs(torques * speeds(state)).sum())
+    coarse, fine = np.abs(errors[::2]), np.abs(errors[1::2])
+    assert (coarse < 0.01 * np.array(sizes[::2])).all()
+    assert np.median(coarse / fine) == pytest.approx(4.0, rel=0.1)  # a half step leaves a quarter, to leading order
