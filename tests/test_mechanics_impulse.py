@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from caster_gym import Model, load_robot
 from caster_gym.engines.torch_model import TorchModel
 from caster_gym.mechanics.impulse import Mobility, stronge
+from caster_gym.mechanics.impulse import impact as struck
 from tests.kane import Kane
 from tests.random_robots import random_motion, random_robot
 
@@ -277,6 +278,14 @@ def test_hardly_sliding_contacts_end_as_those_that_do_not_slide():
         for slip in (1e-9, -1e-9):
             moving = np.stack(stronge(v_n, np.full(300, slip), w, 0.7, mu))
             assert_allclose(moving, still, rtol=0.0, atol=1e-6 * still.max())  # such a slip changes that little
+
+
+def test_a_contact_that_neither_approaches_nor_recedes_is_left_alone():
+    """Also where friction would hold its speed along the normal, in Python's numbers, which cannot divide by zero."""
+    for v_n in (0.0, 0.5):
+        for w in (Mobility(1.0, 0.5, 1.0), Mobility(1.0, -0.5, 1.0)):
+            for v_t in (-1.0, 0.0, 1.0):
+                assert struck(v_n, v_t, w, 0.5, 2.0, 0.0) == (0.0, 0.0)
 
 
 def test_regained_work_is_that_of_restitution():

@@ -55,8 +55,8 @@ def stronge(v_n: Scalar, v_t: Scalar, w: Mobility, restitution: Scalar, friction
     bend = where(straight, 0.0 * v_t, absolute(v_t) / where(straight, 1.0 + 0.0 * v_t, braking))
     at_bend = v_n + sliding_n * bend
     slides = straight | ((sliding_n > 0.0) & (-(1.0 + restitution) * v_n <= sliding_n * bend))
-    after_compression = at_bend >= 0.0  # whether the bend comes in restitution
-    slope = where(slides | after_compression, sliding_n, held_n)  # where sliding_n is positive, else never used
+    after_compression = (at_bend >= 0.0) & (sliding_n > 0.0)  # whether the bend comes in restitution
+    slope = where((slides & (sliding_n > 0.0)) | after_compression, sliding_n, held_n)
     left = at_bend * at_bend + held_n / slope * (restitution * restitution * v_n * v_n - at_bend * at_bend)  # (C5)
     work = at_bend * at_bend - held_n * (v_n + at_bend) * bend  # (C6)
     bounce = where(after_compression, sqrt(maximum(left, _TINY)), restitution * sqrt(maximum(work, _TINY)))
