@@ -319,7 +319,8 @@ def test_set_parameters_change_only_the_selected_robots():
 
 def test_parameters_of_another_shape_are_refused():
     engine = batch().engine
-    with pytest.raises(ValueError, match=r"rows must have shape \(2, 96\), got \(1, 96\)"):
+    width = engine.parameters.shape[1]
+    with pytest.raises(ValueError, match=rf"rows must have shape \(2, {width}\), got \(1, {width}\)"):
         engine.set_parameters(np.array([0, 1]), engine.parameters[:1])
 
 
