@@ -17,7 +17,8 @@ class Motor(Frozen):
 
     max_torque: PositiveFloat  # [N m]
     max_speed: PositiveFloat  # [rad/s] at which no torque is left
-    armature: NonNegativeFloat = 0.0  # [kg m²] inertia of rotor and gears, referred to the joint
+    rotor: NonNegativeFloat = 0.0  # [kg m²] inertia of what turns with the motor, at the motor's side of `gear`
+    armature: NonNegativeFloat = 0.0  # [kg m²] inertia of gears that turn with the joint alone, referred to it
     viscous: NonNegativeFloat = 0.0  # [N m s/rad]
     coulomb: NonNegativeFloat = 0.0  # [N m]
 
@@ -123,6 +124,7 @@ class Platform(Frozen):
     mass: PositiveFloat  # [kg]
     inertia: PositiveFloat  # [kg m²] about a vertical axis through its mass centre
     com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
+    height: NonNegativeFloat = 0.0  # [m] of the mass centre above the floor; 0 leaves loads on wheels as at rest
     footprint: Footprint
 
 
@@ -187,8 +189,8 @@ class Robot(Frozen):
                 update={
                     "wheel": Wheel(**nothing),
                     "link": Link(mass=0.0, inertia=0.0),
-                    "roll": caster.roll.model_copy(update={"armature": 0.0}),
-                    "steer": caster.steer.model_copy(update={"armature": 0.0}),
+                    "roll": caster.roll.model_copy(update={"rotor": 0.0, "armature": 0.0}),
+                    "steer": caster.steer.model_copy(update={"rotor": 0.0, "armature": 0.0}),
                 }
             )
             for caster in self.casters

@@ -31,7 +31,7 @@ class Kane:
         self.trail, self.offset = column(lambda c: c.trail), column(lambda c: c.offset)
         self.radius = column(lambda c: c.radius)
         self.behind, self.left = column(lambda c: c.link.com[0]), column(lambda c: c.link.com[1])
-        self.platform_com = robot.platform.com
+        self.platform_com, self.height = robot.platform.com, robot.platform.height
         self.masses = torch.cat(
             (_vector(robot.platform.mass), column(lambda c: c.link.mass), column(lambda c: c.wheel.mass))
         )
@@ -40,7 +40,9 @@ class Kane:
         upright[:, 2] = flat  # only their yaw inertia is ever felt
         yaw, spin = column(lambda c: c.wheel.yaw_inertia), column(lambda c: c.wheel.spin_inertia)
         self.inertias = torch.diag_embed(torch.cat((upright, torch.stack((yaw, spin, yaw), -1))))
-        self.armatures = torch.cat((column(lambda c: c.roll.armature), column(lambda c: c.steer.armature)))
+        armatures = torch.cat((column(lambda c: c.roll.armature), column(lambda c: c.steer.armature)))
+        rotors = torch.cat((column(lambda c: c.roll.rotor), column(lambda c: c.steer.rotor)))
+        self.spinning = torch.cat((armatures, rotors))  # inertias of what turns with the joints and with the motors
         self.viscous = torch.cat((column(lambda c: c.roll.viscous), column(lambda c: c.steer.viscous)))
         self.coulomb = torch.cat((column(lambda c: c.roll.coulomb), column(lambda c: c.steer.coulomb)))
         self.scrub = column(lambda c: c.scrub)
@@ -52,6 +54,10 @@ class Kane:
             (torch.cat((0.0 * heading, zero, identity), 1), torch.cat((-heading, identity, zero), 1))
         )
         self.yaws = torch.cat((0.0 * heading, identity, zero), 1)
+        gears = torch.tensor([caster.gear for caster in robot.casters], dtype=torch.float64)
+        theta, delta = self.joints[:n], self.joints[n:]
+        motors = [gears[:, k, :1] * theta + gears[:, k, 1:] * delta for k in (0, 1)]
+        self.spins = torch.cat((self.joints, *motors))  # rates of joints and motors from the rates of q
 
     # Where the bodies are: platform, links, wheels.
 
@@ -69,7 +75,7 @@ class Kane:
         links = pivots - self.behind[:, None] * f + self.left[:, None] * left
         wheels = pivots - self.trail[:, None] * f + self.offset[:, None] * left
         flat = torch.cat((platform[None], links, wheels))
-        height = torch.cat((torch.zeros(self.count + 1, dtype=torch.float64), self.radius))
+        height = torch.cat((_vector(self.height), self.radius, self.radius))  # links lie as high as their axles
         return torch.cat((flat, height[:, None]), 1)
 
     def _attitudes(self, q: Tensor) -> Tensor:
@@ -103,10 +109,10 @@ class Kane:
         return torch.linalg.inv(both)[:, -3:]
 
     def _partial_velocities(self, q: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Of mass centres, of attitudes, and of the driven joints, per unit twist."""
+        """Of mass centres, of attitudes, and of joints and motors, per unit twist."""
         velocity, spin = self._velocities(q)
         partial = self._partial(q)
-        return velocity @ partial, spin @ partial, self.joints @ partial
+        return velocity @ partial, spin @ partial, self.spins @ partial
 
     def _coordinates(self, steering: np.ndarray) -> Tensor:
         delta = torch.as_tensor(steering, dtype=torch.float64)
@@ -118,7 +124,7 @@ class Kane:
         return attitudes @ self.inertias @ attitudes.mT
 
     def _inertial(self, q: Tensor, twist: Tensor, twist_rate: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Rates of change of momentum, of spin (2 N + 1, 3), and of the rotors' spin (2 N), in W."""
+        """Rates of change of momentum, of spin (2 N + 1, 3), and of the spin of gears and rotors (4 N), in W."""
         partial = self._partial_velocities(q)
         move = self._partial(q) @ twist
         _, drift = jvp(lambda q: tuple(part @ twist for part in self._partial_velocities(q)), (q,), (move,))
@@ -126,7 +132,7 @@ class Kane:
         omega = (partial[1] @ twist)[..., None]
         tensors = self._inertia_tensors(q)
         spin = tensors @ alpha[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1)
-        return self.masses[:, None] * a, spin[..., 0], self.armatures * joint
+        return self.masses[:, None] * a, spin[..., 0], self.spinning * joint
 
     # What comes out.
 
@@ -136,7 +142,7 @@ class Kane:
         v, w, joint = self._partial_velocities(q)
         moving = torch.einsum("b,bij,bik->jk", self.masses, v, v)
         turning = torch.einsum("bij,bil,blk->jk", w, self._inertia_tensors(q), w)
-        return (moving + turning + joint.T @ (self.armatures[:, None] * joint)).numpy()
+        return (moving + turning + joint.T @ (self.spinning[:, None] * joint)).numpy()
 
     def bias(self, steering: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """h (3,): the force that keeps the components of the twist constant without friction."""
@@ -166,13 +172,20 @@ class Kane:
         momentum, spin, rotors = self._inertial(q, torch.as_tensor(twist), rate)
         velocity, turning = self._velocities(q)
         needed = torch.einsum("bin,bi->n", velocity, momentum) + torch.einsum("bin,bi->n", turning, spin)
-        needed = needed + self.joints.T @ rotors - self._applied(q, twist, torque, wrench)
+        needed = needed + self.spins.T @ rotors - self._applied(q, twist, torque, wrench)
         force = torch.linalg.lstsq(self._contact_rows(q).T, needed[:, None]).solution.reshape(self.count, 2)
         _, f, left = self._points(q)
         return torch.stack(((force * f).sum(1), (force * left).sum(1)), -1).numpy()
 
     def momentum_rate(self, steering: np.ndarray, twist: np.ndarray, twist_rate: np.ndarray) -> np.ndarray:
-        """Rate of change (3,) of all bodies' momentum, and of their spin about the fixed point where C is now."""
+        """Rate of change (3,) of all bodies' momentum, and of their spin about the vertical where C is now."""
+        force, moment = self.momentum_rates(steering, twist, twist_rate)
+        return np.array([*force[:2], moment[2]])
+
+    def momentum_rates(
+        self, steering: np.ndarray, twist: np.ndarray, twist_rate: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Rates of change (3,) and (3,) of momentum, and of spin about the fixed point on the floor below C."""
         q, nu, rate = self._coordinates(steering), torch.as_tensor(twist), torch.as_tensor(twist_rate)
         fixed = torch.cat((q[:2], torch.zeros(1)))
 
@@ -183,7 +196,8 @@ class Kane:
             return linear.sum(0), (torch.linalg.cross(self._places(q) - fixed, linear) + own[..., 0]).sum(0)
 
         _, (force, moment) = jvp(momentum, (q, nu), (self._partial(q) @ nu, rate))
-        return torch.cat((_plane(q[2]).T @ force[:2], moment[2:])).numpy()
+        back = _about_z(q[2:3])[0].T
+        return (back @ force).numpy(), (back @ moment).numpy()
 
     def _reduced(self, q: Tensor, inertial: tuple[Tensor, Tensor, Tensor]) -> Tensor:
         v, w, joint = self._partial_velocities(q)

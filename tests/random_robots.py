@@ -83,10 +83,12 @@ def _random_caster(rng: np.random.Generator, angle: float) -> Caster:
 
 
 def _random_motor(rng: np.random.Generator) -> Motor:
+    torque, speed, turning = rng.uniform(0.2, 2.0), rng.uniform(20.0, 40.0), rng.uniform(1e-4, 2e-3)
     return Motor(
-        max_torque=rng.uniform(0.2, 2.0),
-        max_speed=rng.uniform(20.0, 40.0),
-        armature=rng.uniform(1e-4, 2e-3),
+        max_torque=torque,
+        max_speed=speed,
+        rotor=0.4 * turning,
+        armature=0.6 * turning,
         viscous=rng.uniform(1e-3, 1e-2),
         coulomb=rng.uniform(1e-3, 2e-2),
     )

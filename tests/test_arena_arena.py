@@ -17,6 +17,7 @@ FULL = {
     "beside": {"pillars": 1},
     "restitution": 0.3,
     "friction": 0.1,
+    "impact_law": "chatterjee_ruina",
 }
 
 
@@ -128,6 +129,7 @@ STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) /
         ({"beside": {"gap": [0.2, 0.1]}}, r"'beside\.gap' must be the least and the greatest value, in this order"),
         ({"beside": {"gap": [0.0, 0.1]}}, r"'beside\.gap' should be greater than or equal to 0\.001, got 0"),
         ({"restitution": 1.2}, "'restitution' should be less than or equal to 1, got 1.2"),
+        ({"impact_law": "newton"}, "'impact_law' should be 'stronge' or 'chatterjee_ruina', got 'newton'"),
         ({"pilars": []}, "arena: unknown key 'pilars'; did you mean 'pillars'"),
         ("nowhere.yaml", r"there is no file 'nowhere\.yaml'"),
         ("room", "an arena is a mapping or the name of a YAML file, got 'room'"),

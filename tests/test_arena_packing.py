@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import load_robot
 from caster_gym.arena import distances, read_arena
 from caster_gym.arena.packing import hull_of, pack, surroundings
+from caster_gym.mechanics.impulse import LAWS
 from caster_gym.robot import Footprint
 
 ROBOT = load_robot("chung2008")
@@ -45,7 +46,12 @@ def test_tables_are_contiguous_and_of_the_types_that_compiled_code_knows(arenas)
     assert shapes == ((3,), (2,), (count,), (count, 4))
     assert [table.dtype for table in (*obstacles[:4], parts)] == [np.float64] * 3 + [np.int64] * 2
     assert all(table.flags.c_contiguous for table in (*obstacles[:4], parts))
-    assert (obstacles.restitution, obstacles.friction) == (0.5, 0.2)
+    assert (obstacles.restitution, obstacles.friction, obstacles.law) == (0.5, 0.2, LAWS["stronge"])
+
+
+def test_the_law_of_impacts_is_that_of_the_arenas():
+    other = read_arena({"impact_law": "chatterjee_ruina"})
+    assert pack([other])[0].law == LAWS["chatterjee_ruina"] != LAWS["stronge"]
 
 
 def test_each_arena_keeps_its_obstacles_in_a_common_table():
@@ -80,6 +86,10 @@ def test_surroundings_are_the_outline_and_the_obstacles_of_one_arena():
         (
             [read_arena({}), read_arena({"friction": 0.5})],
             r"must share restitution and friction, got \[\(0\.5, 0\.2\), \(0\.5, 0\.5\)\]",
+        ),
+        (
+            [read_arena({}), read_arena({"impact_law": "chatterjee_ruina"})],
+            "must share impact_law, got chatterjee_ruina, stronge",
         ),
     ],
 )

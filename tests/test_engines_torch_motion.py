@@ -25,9 +25,10 @@ def test_each_robot_moves_as_if_it_were_alone(casters):
     bodies = np.concatenate([rng.normal(size=(2, ROBOTS)), turned[0], rng.normal(size=(3, ROBOTS)), *turned[1:]])
     commands, push = rng.uniform(-1.0, 1.0, (2 * casters, ROBOTS)), rng.normal(size=(3, ROBOTS))
     given = (torch.as_tensor(rows) for rows in (bodies, commands, push))
-    end, done = driven_rows(*given, STEP, robot)
+    end, done, asks = driven_rows(*given, STEP, robot, asking=True)
     for i in range(ROBOTS):
         state, wanted = unpack_state(tuple(bodies[:, i].tolist())), pairs(tuple(commands[:, i].tolist()))
         alone, drive = driven_step(state, wanted, tuple(push[:, i].tolist()), STEP, robot)
         assert_allclose(end[:, i], pack_state(alone), rtol=ROUNDING, atol=ROUNDING)
         assert_allclose(done[:, i], (*flatten(drive.torques), drive.power), rtol=ROUNDING, atol=ROUNDING)
+        assert_allclose(asks[:, i], drive.asks, rtol=1e-9)  # loads are found from differences of weights

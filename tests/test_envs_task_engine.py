@@ -132,6 +132,35 @@ def test_an_impact_changes_the_momentum_by_its_impulse():
         assert abs(jy) <= 0.2 * -jx * (1.0 + 1e-9)  # Coulomb's cone
 
 
+def test_power_is_what_the_motors_do_before_and_after_an_impact():
+    """Nothing but the motors changes the energy of a robot without friction between smooth walls that give all back."""
+    env = made({**WALL, "restitution": 1.0, "friction": 0.0})
+    model, rng, struck = Model(env.robot), np.random.default_rng(4), 0
+    for _ in range(30):
+        env.reset(seed=int(rng.integers(100)))
+        state = put(env, (rng.uniform(0.63, 0.649), 0.0), (*rng.uniform(0.3, 0.8, 1), *rng.uniform(-0.3, 0.3, 2)))
+        info = env.step(rng.uniform(-1.0, 1.0, 6).astype(np.float32))[4]
+        after = env.engine.states[0]
+        gained = model.kinetic_energy(steering(after), after[4:7]) - model.kinetic_energy(steering(state), state[4:7])
+        struck += info["impacts"] > 0.0
+        # J; means over time steps of 5 ms are off by a share of how motor speeds bend, the motors do 0.1 J
+        assert info["power"] * env.task.control_period == pytest.approx(gained, rel=0.02, abs=5e-4)
+    assert struck > 15
+
+
+def test_impacts_ask_of_the_floor_in_proportion_to_their_speed():
+    """And nothing is asked where there is none."""
+    asked = []
+    for speed in (0.4, 0.8):
+        env = made(WALL)
+        state = put(env, (0.65 - 2e-5, 0.0), (speed, 0.0, 0.0))
+        env.engine.states = np.concatenate((state[:7], np.tile([1.0, 0.0], 3)))[None]
+        asked.append(env.step(resting(env))[4]["impact_traction"])
+        assert env.step(resting(env))[4]["impact_traction"] == 0.0
+    assert asked[0] > 0.1
+    assert asked[1] == pytest.approx(2.0 * asked[0], rel=1e-3)  # casters turn a little before they touch
+
+
 def test_touching_costs_what_the_documentation_says():
     env = made(WALL)
     put(env, (0.64, 0.0), (0.8, 0.0, 0.0))

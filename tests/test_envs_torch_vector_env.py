@@ -187,5 +187,5 @@ def test_without_diagnostics_everything_else_is_the_same():
         *ours, infos = whole.step(torch.as_tensor(actions))
         *theirs, fewer = lean.step(torch.as_tensor(actions))
         assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
-    assert set(infos) - set(fewer) == {"traction_use", "conditioning"}
+    assert set(infos) - set(fewer) == {"traction_use", "wheels_lifted", "conditioning"}
     assert all(torch.equal(infos[name], fewer[name]) for name in ("position_error", "progress", "power"))

@@ -177,16 +177,6 @@ def test_a_step_is_the_motion_under_motors_with_limits(moments):
     assert any((np.abs(m.info["torque"]) > 0.0)[driven].all() for m in moments)
 
 
-def test_traction_use_is_the_worst_wheels_share_of_its_friction(moments):
-    for m in moments:
-        robot, model = m.env.robot, Model(m.env.robot)
-        gear = np.array([caster.gear for caster in robot.casters])
-        joints = np.einsum("nij,ni->nj", gear, m.info["torque"].reshape(-1, 2)).ravel()
-        force = np.linalg.norm(model.ground_forces(m.steering, m.twist, joints), axis=-1)
-        share = force / (robot.floor_friction * model.wheel_loads(m.steering))
-        assert_allclose(m.info["traction_use"], share.max(), rtol=1e-10)  # rounding in angles and a 3 × 3 solve
-
-
 def by_the_docstring(distance, turn, speed, omega, shares, driven):
     """Reward terms as the environment's documentation states them, with its numbers."""
 

@@ -1,4 +1,4 @@
-"""(D1) to (D5): the dynamics of the whole robot, against Kane's equations and the laws of mechanics."""
+"""(D1) to (D6): the dynamics of the whole robot, against Kane's equations and the laws of mechanics."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model
 from caster_gym.engines.torch_model import TorchModel
+from caster_gym.mechanics.dynamics import pivot_inertia
+from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import Robot
 from tests.kane import Kane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
@@ -55,6 +57,27 @@ def test_the_printed_model_lacks_just_the_off_axis_term(robot):
     assert_same(missing, expected, ORACLE)
     assert np.abs(missing).max() > 1e-3 * np.abs(Model(robot).bias(steering, twist)).max()  # it is no rounding
     assert abs(missing @ twist) < 1e-12 * np.abs(missing).max() * np.abs(twist).sum()  # rounding
+
+
+def test_a_caster_is_a_constant_mass_at_its_pivot(robot):
+    """(D6): its energy from the pivot's velocity and ω is that of wheel, link, gears and rotors, body by body."""
+    steering, twist, _, _ = random_motion(28, robot)
+    velocities = zip(robot.casters, steering, *Kane(robot).rates(steering, twist), strict=True)
+    for caster, delta, eta, theta, steer in velocities:
+        p = pivot_inertia(robot_parameters(robot.model_copy(update={"casters": (caster, caster)})).casters[0])
+        f = np.exp(1j * delta)
+        pivot = complex(twist[0] - twist[2] * caster.y, twist[1] + twist[2] * caster.x) * np.conj(f)
+        a, b = pivot.real, pivot.imag
+        ours = p.along * a * a + 2.0 * p.cross * a * b + p.across * b * b
+        ours += twist[2] * (2.0 * p.along_turn * a + 2.0 * p.across_turn * b + p.turn * twist[2])
+        wheel, link, (behind, left) = caster.wheel, caster.link, caster.link.com
+        mass_centre = pivot + 1j * eta * complex(-behind, left)
+        theirs = wheel.mass * (caster.radius * theta) ** 2 + wheel.spin_inertia * theta**2
+        theirs += link.mass * abs(mass_centre) ** 2 + (wheel.yaw_inertia + link.inertia) * eta**2
+        theirs += caster.roll.armature * theta**2 + caster.steer.armature * steer**2
+        for motor, ratios in zip((caster.roll, caster.steer), caster.gear, strict=True):
+            theirs += motor.rotor * (ratios[0] * theta + ratios[1] * steer) ** 2
+        assert_allclose(ours, theirs, rtol=1e-11)  # rounding
 
 
 def test_inertia_is_symmetric_and_positive_definite(robot):

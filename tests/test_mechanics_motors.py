@@ -60,6 +60,19 @@ def test_commands_are_shares_of_the_greatest_torque(caster):
     assert motor_torques((7.0, -7.0), (0.0, 0.0), caster) == (caster.roll_max_torque, -caster.steer_max_torque)
 
 
+def test_rotors_have_the_energy_of_their_motors_speeds():
+    """(M4): ½ R Ω² of each motor beside ½ J ϑ̇² of what turns with a joint."""
+    made = random_robot(81, 2).casters[0]
+    for rates in ((2.0, 0.0), (0.0, -3.0), (1.3, 2.1)):
+        numbers = robot_parameters(random_robot(81, 2)).casters[0]
+        ours = numbers.roll_armature * rates[0] ** 2 + numbers.steer_armature * rates[1] ** 2
+        ours += 2.0 * numbers.cross_armature * rates[0] * rates[1]
+        theirs = made.roll.armature * rates[0] ** 2 + made.steer.armature * rates[1] ** 2
+        for motor, ratios in zip((made.roll, made.steer), made.gear, strict=True):
+            theirs += motor.rotor * (ratios[0] * rates[0] + ratios[1] * rates[1]) ** 2
+        assert_allclose(ours, theirs, rtol=1e-13)  # rounding
+
+
 @pytest.mark.parametrize("driven", ["roll_1", "steer_1"])
 def test_passive_motors_give_no_torque(driven):
     robot = random_robot(83, 2).with_actuation((driven,))

@@ -1,5 +1,6 @@
 """caster_gym.wrappers.plants: loads, friction and wheels that no agent is told of."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -66,6 +67,24 @@ def test_loads_are_drawn_within_their_limits():
     assert left.min() >= 0.1 - 1e-9
     assert left.max() <= 0.3 + 1e-9
     assert abs(np.corrcoef(mass, forward)[0, 1]) < 5.0 / np.sqrt(3000)
+
+
+def test_the_height_of_a_load_moves_the_mass_centre_up():
+    """Of two bodies at heights, which shift their common mass centre by their masses; drawn by episode."""
+    robot = load_robot("chung2008")
+    standing = robot.model_copy(update={"platform": robot.platform.model_copy(update={"height": 0.1})})
+    column = PlatformParameters._fields.index("height")
+    for height, expected in ((0.5, (5.0 * 0.1 + 3.0 * 0.5) / 8.0), (None, 0.1)):
+        env = wrap(gym.make("caster_gym:CasterTrack-v0", robot=standing), Payload(mass=3.0, height=height))
+        env.reset(seed=0)
+        assert_allclose(env.unwrapped.engine.parameters[0, column], expected, rtol=1e-14)
+    env = wrap(gym.make("caster_gym:CasterTrack-v0", robot=standing), Payload(mass=3.0, height=(0.2, 0.6)))
+    seen = []
+    for _ in range(5):
+        env.reset()
+        seen.append(env.unwrapped.engine.parameters[0, column])
+    assert len(set(seen)) == 5
+    assert min(seen) > (5.0 * 0.1 + 3.0 * 0.2) / 8.0
 
 
 def test_friction_of_every_joint_is_scaled_and_added_to():

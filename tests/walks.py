@@ -43,7 +43,7 @@ class Walk:
         torque = np.zeros(2 * robot.caster_count) if torque is None else torque
         self.torques = tuple((float(torque[2 * i]), float(torque[2 * i + 1])) for i in range(robot.caster_count))
         self.wrench = (0.0, 0.0, 0.0)
-        self.impulse, self.impacts, self.pressing = np.zeros(2), 0.0, 0.0
+        self.impulse, self.impacts, self.pressing, self.work, self.asked = np.zeros(2), 0.0, 0.0, 0.0, 0.0
 
     def step(self, h, steps=1):
         for _ in range(steps):
@@ -53,6 +53,7 @@ class Walk:
             self.impulse = self.impulse + np.stack(touch.impulse, -1)
             self.impacts = self.impacts + touch.impacts
             self.pressing = self.pressing + touch.pressing
+            self.work, self.asked = self.work + touch.work, np.maximum(self.asked, touch.impact_traction)
         return self
 
     @property

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from caster_gym.analysis.impulse_shape import CENTRE, Array, ComplexArray, elongation
 from caster_gym.engines.numpy_model import Model
+from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import Robot, check_joints
 
 STRIDE = 0.05  # [rad] between neighbouring points of a traced curve
@@ -197,7 +198,9 @@ def _wrapped(angle: Array, period: float = 2.0 * np.pi) -> Array:
 
 def _period(robot: Robot) -> float:
     """Half a turn of a caster changes the signs of its g_θ and g_η, which M does not feel; an armature's g_δ tells."""
-    return np.pi if all(caster.steer.armature == 0.0 for caster in robot.casters) else 2.0 * np.pi
+    casters = robot_parameters(robot).casters
+    felt = any(caster.steer_armature or caster.cross_armature for caster in casters)
+    return 2.0 * np.pi if felt else np.pi
 
 
 def _free(model: Model, steering: ArrayLike, joints: Sequence[str], count: int) -> tuple[list[int], Array]:

@@ -72,4 +72,6 @@ def force_by_momenta(motion: DrivenMotion, robot: Robot) -> Array:
         add((caster.wheel.yaw_inertia + caster.link.inertia) * eta[:, i], turn)
         add((caster.wheel.spin_inertia + caster.roll.armature) * theta[:, i], roll)
         add(caster.steer.armature * delta[:, i], steer)
+        for motor, (by_roll, by_steer) in zip((caster.roll, caster.steer), caster.gear, strict=True):
+            add(motor.rotor * (by_roll * theta[:, i] + by_steer * delta[:, i]), by_roll * roll + by_steer * steer)
     return force

@@ -175,8 +175,8 @@ class OrthogonalComplement:
 
     def _inertia(self, e: Embedding) -> Array:
         s_t, g_t = np.swapaxes(e.s, -1, -2), np.swapaxes(e.g, -1, -2)
-        rotors = self._numbers.armatures[:, None]
-        return np.asarray(g_t @ self._numbers.momenta(e.g, e.left) + s_t @ (rotors * e.s))  # (N6)
+        rotors = self._numbers.rotors
+        return np.asarray(g_t @ self._numbers.momenta(e.g, e.left) + s_t @ (rotors @ e.s))  # (N6)
 
     def _coriolis(self, e: Embedding, x: Array) -> Array:
         """C x of columns x (…, 3, k), multiplied from the right: C itself where x is the unit matrix.
@@ -184,8 +184,8 @@ class OrthogonalComplement:
         GᵀWMG is zero: the gyroscopic moment of a wheel points along its rolling direction, and the floor takes it.
         """
         s_t, g_t = np.swapaxes(e.s, -1, -2), np.swapaxes(e.g, -1, -2)
-        rotors = self._numbers.armatures[:, None]
-        return np.asarray(g_t @ self._numbers.momenta(e.g_rate @ x, e.left) + s_t @ (rotors * (e.s_rate @ x)))  # (N6)
+        rotors = self._numbers.rotors
+        return np.asarray(g_t @ self._numbers.momenta(e.g_rate @ x, e.left) + s_t @ (rotors @ (e.s_rate @ x)))  # (N6)
 
     def _complete(self, j_p: Array, j_a: Array) -> Array:
         s = np.zeros((*j_p.shape[:-2], 3 * self.robot.caster_count, INDEPENDENT))
@@ -230,7 +230,12 @@ class _Numbers:
         platform = [0.0, 0.0, robot.platform.inertia] + [robot.platform.mass] * 3
         self.diagonal = np.array([*wheels, *links, platform])[..., None]  # of M, but for the axles' share
         self.axle = np.array([c.wheel.spin_inertia - c.wheel.yaw_inertia for c in casters])
-        self.armatures = np.array([j for c in casters for j in (0.0, c.roll.armature, c.steer.armature)])
+        self.rotors = np.zeros((3 * self.count, 3 * self.count))  # over η, θ, δ of each caster, gears included
+        for i, c in enumerate(casters):
+            gear, motors = np.array(c.gear), (c.roll, c.steer)
+            own = np.diag([motor.armature for motor in motors])
+            joints = slice(3 * i + 1, 3 * i + 3)
+            self.rotors[joints, joints] = own + gear.T @ np.diag([motor.rotor for motor in motors]) @ gear
         self.viscous = np.array([b for c in casters for b in (c.scrub, c.roll.viscous, c.steer.viscous)])
         self.coulomb = np.array([b for c in casters for b in (0.0, c.roll.coulomb, c.steer.coulomb)])
         self.coulomb_speed = robot.coulomb_speed

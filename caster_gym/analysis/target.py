@@ -20,6 +20,7 @@ class Payload(Frozen):
     mass: NonNegativeFloat  # [kg]
     inertia: NonNegativeFloat = 0.0  # [kg m²] about a vertical axis through its mass centre
     com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
+    height: NonNegativeFloat | None = None  # [m] of the mass centre above the floor; None: as high as the platform's
 
 
 class Target(Frozen):
@@ -57,8 +58,10 @@ def loaded(robot: Robot, target: Target) -> Robot:
     load, bare = target.payload, robot.platform
     if load is None or load.mass + load.inertia == 0.0:
         return robot
-    full = with_load(robot_parameters(robot).platform, load.mass, *load.com, load.inertia)
-    platform = bare.model_copy(update={"mass": full.mass, "inertia": full.inertia, "com": (full.com_x, full.com_y)})
+    full = with_load(robot_parameters(robot).platform, load.mass, *load.com, load.inertia, load.height)
+    com = full.com_x, full.com_y
+    changed = {"mass": full.mass, "inertia": full.inertia, "com": com, "height": full.height}
+    platform = bare.model_copy(update=changed)
     return robot.model_copy(update={"platform": platform})
 
 

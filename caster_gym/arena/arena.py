@@ -8,6 +8,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, m
 
 from caster_gym.arena.outlines import Outline, convex, polygon_fault
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
+from caster_gym.mechanics.impulse import ImpactLaw
 
 FARTHEST = 1e6  # [m] from the origin
 
@@ -139,6 +140,7 @@ class Arena(Frozen):
     beside: Beside | None = None
     restitution: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5  # [-]
     friction: NonNegativeFloat = 0.2  # [-] between hull and obstacles
+    impact_law: ImpactLaw = "stronge"  # of a single contact with friction
 
     @field_validator("room")
     @classmethod

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from caster_gym.arena.arena import Arena
 from caster_gym.arena.outlines import Outline, convex
+from caster_gym.mechanics.impulse import LAWS
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.robot import Robot
 
@@ -34,7 +35,7 @@ def hull_from(outline: Outline) -> Hull:
 def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
     """All obstacles of some arenas in one table, and the first and the end (arenas, 2) of those of each.
 
-    The arenas share one restitution and one friction. Obstacles are in the order of `Arena.obstacles`.
+    The arenas share restitution, friction and the law of impacts. Obstacles are in the order of `Arena.obstacles`.
     """
     if not arenas:
         raise ValueError("at least one arena is needed, got none")
@@ -43,6 +44,9 @@ def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
     bounces = {(arena.restitution, arena.friction) for arena in arenas}
     if len(bounces) > 1:
         raise ValueError(f"arenas in one table must share restitution and friction, got {sorted(bounces)}")
+    laws = {arena.impact_law for arena in arenas}
+    if len(laws) > 1:
+        raise ValueError(f"arenas in one table must share impact_law, got {', '.join(sorted(laws))}")
     outlines = [[one.outline for _, one in arena.obstacles] for arena in arenas]
     everything = [outline for those in outlines for outline in those]
     obstacles = Obstacles(
@@ -54,6 +58,7 @@ def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
         ),
         restitution=arenas[0].restitution,
         friction=arenas[0].friction,
+        law=LAWS[arenas[0].impact_law],
     )
     return obstacles, _spans([len(those) for those in outlines])
 

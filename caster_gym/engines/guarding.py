@@ -73,4 +73,5 @@ def borrowed_obstacles(obstacles: Any) -> Any:
         borrowed(obstacles.spans),
         obstacles.restitution,
         obstacles.friction,
+        obstacles.law,
     )

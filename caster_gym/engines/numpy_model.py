@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.contact import guarded_step
+from caster_gym.mechanics.impulse import ImpactLaw
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
@@ -77,8 +78,8 @@ class Model:
     ) -> Array:
         """Twist rate (..., 3): derivative of the components of the twist in B. wrench (..., 3) acts at C, in B."""
         directions, v = self._directions(steering), self._vector("twist", twist)
-        force = (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
-        return self._stack(dynamics.forward_dynamics(v, directions, self._torques(torque), force, self._parameters))
+        force, torques = self._wrench(wrench), self._torques(torque)
+        return self._stack(dynamics.forward_dynamics(v, directions, torques, force, self._parameters))
 
     def inverse_dynamics(self, steering: ArrayLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
         """Generalised force (..., 3) at C, in B, that drives and wrench must supply together, friction included."""
@@ -92,17 +93,40 @@ class Model:
         directions, v = self._directions(steering), self._vector("twist", twist)
         return self._scalar(dynamics.kinetic_energy(v, directions, self._parameters))
 
-    def ground_forces(self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike) -> Array:
-        """Forces (..., N, 2) of the floor on each wheel along f and f⊥, under the given joint torques. [N]"""
+    def ground_forces(
+        self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike, wrench: ArrayLike | None = None
+    ) -> Array:
+        """Forces (..., N, 2) of the floor on each wheel along f and f⊥. [N]
+
+        Under joint torques and all else that pushes the robot: wrench (..., 3) at C, in B.
+        """
         directions, v, torques = self._directions(steering), self._vector("twist", twist), self._torques(torque)
-        v_rate = dynamics.forward_dynamics(v, directions, torques, (0.0, 0.0, 0.0), self._parameters)
+        v_rate = dynamics.forward_dynamics(v, directions, torques, self._wrench(wrench), self._parameters)
         shared = v, v_rate, self._parameters.platform.coulomb_speed
         forces = each(ground.ground_force, shared, directions, self._parameters.casters, torques)
         return self._stack([self._stack(force) for force in forces], -2)
 
-    def wheel_loads(self, steering: ArrayLike) -> Array:
-        """Normal forces (..., N) under the wheels of the robot at rest. [N]"""
-        return self._stack(ground.wheel_loads(self._directions(steering), self._parameters))
+    def wheel_loads(
+        self,
+        steering: ArrayLike,
+        twist: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Array:
+        """Normal forces (..., N) under the wheels: at rest, or of a robot that moves under torques and a wrench. [N]
+
+        The wrench (..., 3) at C, in B, acts at the height of the platform's mass centre. A wheel that lifts has no
+        load; a negative load says that the robot tips over.
+        """
+        directions = self._directions(steering)
+        if twist is None and torque is None and wrench is None:
+            return self._stack(ground.wheel_loads(directions, (0.0, 0.0), self._parameters))
+        v = (0.0, 0.0, 0.0) if twist is None else self._vector("twist", twist)
+        none = ((0.0, 0.0),) * self.robot.caster_count
+        torques, force = none if torque is None else self._torques(torque), self._wrench(wrench)
+        v_rate = dynamics.forward_dynamics(v, directions, torques, force, self._parameters)
+        tilted = ground.tilt(v, v_rate, directions, force, self._parameters)
+        return self._stack(ground.wheel_loads(directions, tilted, self._parameters))
 
     @property
     def characteristic_length(self) -> float:
@@ -127,12 +151,17 @@ class Model:
         normal: ArrayLike,
         restitution: ArrayLike,
         friction: ArrayLike = 0.0,
+        law: ImpactLaw = "stronge",
     ) -> tuple[Array, Array]:
         """Impulse (..., 2), normal and tangential [N s], and the twist (..., 3) after an impact.
 
         point (..., 2) [m] and normal (..., 2), a unit vector from the obstacle into the robot, in B. The tangent is
-        the normal turned by +90°. Nothing happens at a contact that separates.
+        the normal turned by +90°. Nothing happens at a contact that separates. law: "stronge" integrates along the
+        impulse, with restitution of energy; "chatterjee_ruina" is algebraic, with restitution of velocity. Without
+        friction both are the same.
         """
+        if law not in impulse.LAWS:
+            raise ValueError(f"law must be one of {', '.join(impulse.LAWS)}, got {law!r}")
         p, n = self._components("point", point, 2), self._components("normal", normal, 2)
         length = n[0] * n[0] + n[1] * n[1]
         wrong = abs(length - 1.0) > 1e-6
@@ -141,7 +170,8 @@ class Model:
         e = self._in_range("restitution", restitution, 0.0, 1.0)
         mu = self._in_range("friction", friction, 0.0, float("inf"))
         directions, v = self._directions(steering), self._vector("twist", twist)
-        j_n, j_t, after = impulse.collide(v, directions, p, n, e, mu, self._parameters)
+        m = dynamics.inertia(directions, self._parameters)
+        j_n, j_t, after = impulse.collide(v, m, p, n, e, mu, impulse.LAWS[law])
         return self._stack((j_n, j_t)), self._stack(after)
 
     def simulate(
@@ -221,6 +251,9 @@ class Model:
     def _vector(self, name: str, value: Any) -> Vector:
         x, y, z = self._components(name, value, 3)
         return x, y, z
+
+    def _wrench(self, wrench: Any) -> Vector:
+        return (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
 
     def _unit(self, angle: Any) -> Direction:
         return self._arrays.cos(angle), self._arrays.sin(angle)

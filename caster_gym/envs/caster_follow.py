@@ -37,6 +37,9 @@ class CasterFollowEnv(CasterEnv):
     | impact | −0.5 J/(J + 0.5 N s), J the normal impulse of obstacles in the period | −0.5 … 0 |
     | alive | 0.52, so that no step is worth less than none | 0.52 |
 
+    **Impacts** as for `CasterTrackEnv`: where `impact_traction` is above 1 the floor cannot hold the wheels, and the
+    true impulse is smaller than the one here.
+
     **Info** as for `CasterTrackEnv`; progress [m] is s, progress_share is σ, position_error the distance to the path.
 
     **Endings** `terminated`: the robot left its corridor (0.25 m from the path), its state stopped being finite, or it

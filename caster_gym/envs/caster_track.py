@@ -54,15 +54,27 @@ class CasterTrackEnv(CasterEnv):
     | reward_terms | the terms above, by name | – |
     | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
     | power | mean mechanical power of all motors over the control period | W |
-    | traction_use | largest share of the floor's friction that a wheel uses by the torques; above 1 it slips | – |
+    | traction_use | greatest share of the floor's friction that a wheel uses in the period; above 1 it would slip | – |
+    | wheels_lifted | most wheels at once that a push, an acceleration or a load lifts off the floor | – |
     | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |
     | pose, reference_pose | x, y, cos β, sin β in W | m, – |
     | progress, progress_share | 0 in this task | m, – |
     | clearance | gap to the nearest obstacle; inf where there is none | m |
     | impacts | number of impacts faster than 1 cm/s in the control period | – |
+    | impact_traction | largest share of the floor's friction that a wheel uses in one of them; above 1 it slips | – |
     | normal_impulse | sum of all normal impulses of obstacles, of impacts and of lasting contacts | N s |
     | impulse | sum of the impulses of obstacles on the robot, in W | N s |
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
+
+    **Impacts** act through the whole inertia, as if the floor could keep the wheels from slipping whatever that takes.
+    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller. Head-on into a smooth wall at 0.5 m/s
+    with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
+
+    | robot | impact_traction | impulse here | MuJoCo's, whose wheels slip | sideways here | MuJoCo's |
+    |---|---|---|---|---|---|
+    | chung2008 | 1.0 | 4.7 N s | 4.7 N s | 0.05 m/s | 0.05 m/s |
+    | xr4000 | 8.4 | 68 N s | 54 N s | 0.05 m/s | 0.01 m/s |
+    | tidybot2 | 36 | 120 N s | 48 N s | 0.15 m/s | 0.02 m/s |
 
     **Endings** `terminated`: the robot left its corridor (0.5 m from the reference), its state stopped being finite,
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:

@@ -18,8 +18,8 @@ from caster_gym.envs.block_layout import (
     NOT_FINITE,
     POSITION_ERROR,
     TOUCHED,
-    TRACTION_USE,
 )
+from caster_gym.envs.tracking import ASKS, IMPACT_TRACTION
 
 _TERMS = slice(FIRST_TERM, FIRST_POSE)
 _TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
@@ -45,7 +45,8 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any
         "reward_terms": dict(zip(terms, row[_TERMS], strict=False)),
         "torque": columns[_TORQUES],
         "power": row[FIRST_RECORD],
-        "traction_use": row[TRACTION_USE],
+        "traction_use": row[FIRST_RECORD + ASKS],
+        "wheels_lifted": row[FIRST_RECORD + ASKS + 1],
         "conditioning": row[CONDITIONING],
         "pose": columns[_POSE],
         "reference_pose": columns[_REFERENCE_POSE],
@@ -54,6 +55,7 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any
         "clearance": row[FIRST_SITUATION + 2],
         "impacts": row[FIRST_RECORD + 6],
         "impulse": columns[_IMPULSE],
+        "impact_traction": row[FIRST_RECORD + IMPACT_TRACTION],
         "normal_impulse": row[FIRST_RECORD + 3],
         "left_corridor": left,
         "not_finite": unfinite,

@@ -44,9 +44,19 @@ class Scene:
 
 
 def draw_scene(
-    robot: Robot, time: float, state: Array, report: Array, path: Array, corridor: float, obstacles: Obstacles
+    robot: Robot,
+    time: float,
+    state: Array,
+    report: Array,
+    wrench: Array,
+    path: Array,
+    corridor: float,
+    obstacles: Obstacles,
 ) -> Scene:
-    """The scene of a robot with a state (7 + 2 N,) and the report of its last control period, see `tracking.report`."""
+    """The scene of a robot with a state (7 + 2 N,) and the report of its last control period, see `tracking.report`.
+
+    wrench (3,): what pushed it from outside, beside obstacles, at C in B [N, N, N m].
+    """
     torque, record = report[FIXED_REPORT_ROWS:], report[FIRST_RECORD:]
     return Scene(
         robot=robot,
@@ -55,7 +65,7 @@ def draw_scene(
         twist=state[4:7],
         directions=state[7:].reshape(-1, 2),
         torque=torque,
-        ground_forces=_ground_forces(robot, state, torque),
+        ground_forces=_ground_forces(robot, state, torque, wrench, record[9:12]),
         path=path,
         corridor=corridor,
         reference=report[FIRST_POSE + 4 : FIRST_POSE + 8],
@@ -66,10 +76,11 @@ def draw_scene(
     )
 
 
-def _ground_forces(robot: Robot, state: Array, torque: Array) -> Array:
+def _ground_forces(robot: Robot, state: Array, torque: Array, wrench: Array, held: Array) -> Array:
     """Forces (N, 2) of the floor on each wheel along its rolling direction and to its left. [N]"""
     parameters, now = robot_parameters(robot), unpack_state(tuple(state.tolist()))
     at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
-    rate = forward_dynamics(now.twist, now.directions, at_joints, (0.0, 0.0, 0.0), parameters)
+    x, y, moment = (wrench + held).tolist()
+    rate = forward_dynamics(now.twist, now.directions, at_joints, (x, y, moment), parameters)
     shared = now.twist, rate, parameters.platform.coulomb_speed
     return np.array(each(ground.ground_force, shared, now.directions, parameters.casters, at_joints))

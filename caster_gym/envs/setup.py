@@ -10,6 +10,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from caster_gym.analysis.actuation import warn_if_singular
+from caster_gym.analysis.tipping import warn_if_lifting
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.arena.beside import draw_beside
 from caster_gym.arena.checks import check_free
@@ -166,6 +167,7 @@ def _chosen(robot: RobotLike, actuation: Actuation) -> Robot:
     if actuation is not None:
         chosen = chosen.with_actuation(actuation if isinstance(actuation, str) else tuple(actuation))
     warn_if_singular(chosen)
+    warn_if_lifting(chosen)
     return chosen
 
 

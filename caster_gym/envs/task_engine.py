@@ -353,6 +353,7 @@ class TaskEngine:
             float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
             self.states[robot],
             self._report_of(robot),
+            self.wrenches[robot],
             self.plan.tables[path][:, :2],
             self._pace.corridor,
             self._obstacles_beside(path),

@@ -38,10 +38,21 @@ from caster_gym.envs.block_layout import (
 from caster_gym.envs.delivery import copy_rows, deliver, give_results
 from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge, weights_of
 from caster_gym.envs.randomness import uniform
-from caster_gym.envs.tracking import GAP_LIMIT, Record, Reference, Situation, flat_report, observe, report, start
+from caster_gym.envs.tracking import (
+    ASKS,
+    GAP_LIMIT,
+    Record,
+    Reference,
+    Situation,
+    flat_report,
+    observe,
+    record_of,
+    report,
+    start,
+)
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import driven_step, guarded_driven_step
-from caster_gym.mechanics.scalars import add, clip, each, flatten, where
+from caster_gym.mechanics.scalars import add, clip, each, flatten, maximum
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
 
 _REFERENCE = (0.0,) * REFERENCE_ROWS
@@ -137,7 +148,7 @@ def _look_around(desk: Any, lane: Any, robot: Any, state: Any, obstacles: Any, w
 def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Sizes) -> None:
     """Let robots, the first of the batch's in this block being `first`, move for a control period."""
     rows, room_at, h, reach = torque_row(sizes), room_row(sizes), world.time_step, reach_of(world.hull)
-    share = 1.0 / world.substeps
+    share, asks_row = 1.0 / world.substeps, record_row(sizes) + ASKS
     for row in range(rows, reference_row(sizes)):
         for lane in range(lanes):
             desk[row * LANES + lane] = 0.0
@@ -154,6 +165,8 @@ def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Si
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
             write(desk, lane, 0, end)
             write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
+            asked = went * drive.asks.traction, went * drive.asks.lifted
+            write(desk, lane, asks_row, each(maximum, (), asked, read(desk, lane, asks_row, asked)))
             desk[room_at * LANES + lane] = room
         _take_care(desk, first, here, share, world.obstacles, world, sizes)
 
@@ -176,25 +189,12 @@ def _careful_step(
     wrench = read(desk, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
     robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
     state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end)
-    mean = each(_scaled, (share,), (*flatten(drive.torques), drive.power))
+    mean = each(_scaled, (share,), flatten(drive.torques))
     write(desk, lane, 0, pack_state(state))
     rows = torque_row(sizes)
     write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
     done = Record(*read(desk, lane, record_row(sizes), _RECORD))
-    hit = touch.impacts > 0.0
-    write(
-        desk,
-        lane,
-        record_row(sizes) + 1,
-        (
-            done.impulse_x + touch.impulse[0],
-            done.impulse_y + touch.impulse[1],
-            done.pressing + touch.pressing,
-            where(hit, touch.point[0], done.point_x),
-            where(hit, touch.point[1], done.point_y),
-            done.impacts + touch.impacts,
-        ),
-    )
+    write(desk, lane, record_row(sizes), record_of(done, drive, touch, share)[:])
     desk[room_row(sizes) * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.utils import _pytree as pytree
 
 from caster_gym.envs.plan import Plan
-from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record
+from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record, record_of
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.plant import guarded_driven_step
@@ -104,6 +104,7 @@ class TorchSurroundings:
             self._spans,
             self._all.restitution,
             self._all.friction,
+            self._all.law,
         )
 
     def look(self, state: State, paths: Tensor, count: int) -> tuple[Tensor, tuple[Neighbour, ...]]:
@@ -147,16 +148,7 @@ class TorchSurroundings:
         end, drive, touch = guarded_driven_step(
             state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans)
         )
-        done, hit = Record(*record[n:, near].unbind(0)), touch.impacts > 0.0
-        happened = Record(
-            done.power + share * drive.power,
-            done.impulse_x + touch.impulse[0],
-            done.impulse_y + touch.impulse[1],
-            done.pressing + touch.pressing,
-            where(hit, touch.point[0], done.point_x),
-            where(hit, touch.point[1], done.point_y),
-            done.impacts + touch.impacts,
-        )
+        happened = record_of(Record(*record[n:, near].unbind(0)), drive, touch, share)
         torques = record[:n, near] + share * torch.stack(flatten(drive.torques))
         gap = clearance(end.position, end.heading, self.hull, obstacles, 0, len(self._spans))
         return (

@@ -28,6 +28,7 @@ from caster_gym.envs.torch_guides import TorchGuide, torch_guide
 from caster_gym.envs.torch_obstacles import Given, torch_surroundings
 from caster_gym.envs.torch_randomness import episode_seed, uniform
 from caster_gym.envs.tracking import (
+    ASKS,
     GAP_LIMIT,
     Neighbour,
     Record,
@@ -45,7 +46,7 @@ from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, t
 
 TaskName: TypeAlias = Literal["track", "follow"]
 
-DIAGNOSTICS = ("traction_use", "conditioning")
+DIAGNOSTICS = ("traction_use", "wheels_lifted", "conditioning")
 _ENGINES = {"track": (track_engine, "random_paths"), "follow": (follow_engine, "rounded_square")}
 _BEFORE = -1.0  # [m] progress of an episode that is about to start
 
@@ -253,17 +254,21 @@ class TorchTask:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """States, records and rooms after RK4 steps; who may touch something stays, with a negative room."""
         n = self._joints
-        around = self._around
+        around, asked = self._around, slice(n + ASKS, n + ASKS + 2)
         for _ in range(steps):
-            target, done = driven_rows(bodies, given.commands, given.push, self._h, given.robot)
+            target, done, asks = driven_rows(bodies, given.commands, given.push, self._h, given.robot, self.diagnostics)
             share: Scalar = 1.0 / self._substeps
             if around is None:
                 bodies = target
             else:
                 now, aim = unpack_state(bodies.unbind(0)), unpack_state(target.unbind(0))
                 end, room, went = settled(around, room, now, aim, self._h, around.hull.reach)
-                bodies, share = torch.stack(end), share * went.to(self.dtype)
-            record = torch.cat((record[: n + 1] + share * done, record[n + 1 :]))
+                bodies, went = torch.stack(end), went.to(self.dtype)
+                share, asks = share * went, went * asks
+            asks = torch.maximum(asks, record[asked])
+            record = torch.cat(
+                (record[: n + 1] + share * done, record[n + 1 : asked.start], asks, record[asked.stop :])
+            )
         return bodies, record, room
 
     def _looked(
@@ -291,10 +296,11 @@ class TorchTask:
         if self.diagnostics:
             whole = report(state, reference, errors, torques, done, situation, ended, terms, robot)
         else:
-            none = torch.zeros_like(gap)
             pose, wanted = state.position + state.heading, (reference.x, reference.y, reference.cos, reference.sin)
             distance = sqrt(distance_square(errors))
-            whole = Report(ended, distance, errors.sin, errors.cos, none, none, terms, pose, wanted, done, situation)
+            whole = Report(
+                ended, distance, errors.sin, errors.cos, torch.zeros_like(gap), terms, pose, wanted, done, situation
+            )
         told = list(flat_report(whole, torques))
         told[layout.HEADING_SIN] = torch.atan2(errors.sin, errors.cos)
         seen = observe(state, reference, errors, guidance.preview, nearest, robot)

@@ -9,11 +9,10 @@ from typing import NamedTuple, TypeAlias
 
 from caster_gym.mechanics.actuation import conditioning
 from caster_gym.mechanics.caster import joint_rates
-from caster_gym.mechanics.dynamics import forward_dynamics
-from caster_gym.mechanics.ground import ground_force, traction_use, wheel_loads
+from caster_gym.mechanics.contact import Touch
 from caster_gym.mechanics.integration import State, difference, pack_state
-from caster_gym.mechanics.motors import joint_torques
-from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
+from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
+from caster_gym.mechanics.plant import Drive
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
@@ -21,7 +20,7 @@ from caster_gym.mechanics.scalars import (
     clip,
     each,
     flatten,
-    greatest,
+    maximum,
     minimum,
     sqrt,
     total,
@@ -38,6 +37,8 @@ ACCELERATION_UNIT = 2.0  # [m/s²]
 YAW_ACCELERATION_UNIT = 4.0  # [rad/s²]
 GAP_UNIT = 0.25  # [m] to an obstacle
 GAP_LIMIT = 1.0  # [m] obstacles farther away look as if they were there
+ASKS = 7  # row of a Record from which on stands what was asked of the floor
+IMPACT_TRACTION = 12  # and the row of what impacts asked
 OBSERVATION_LIMIT = 20.0  # observed quantities are clipped here, far beyond what a robot in its corridor reaches
 
 Point: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
@@ -110,6 +111,12 @@ class Record(NamedTuple):
     point_x: Scalar  # [m] of the last impact, in W
     point_y: Scalar
     impacts: Scalar  # how many
+    traction: Scalar  # [-] greatest share of the floor's friction that a wheel used at the start of a time step
+    lifted: Scalar  # most wheels that left the floor at once
+    held_x: Scalar  # [N, N, N m] wrench of lasting contacts on the robot at the end, at C, in B
+    held_y: Scalar
+    held_moment: Scalar
+    impact_traction: Scalar  # [-] greatest share of the floor's friction that a wheel used in an impact
 
 
 class Situation(NamedTuple):
@@ -205,6 +212,24 @@ def touched(record: Record, touching_ends: Scalar) -> Scalar:
     return where(record.pressing * touching_ends > 0.0, 1.0, 0.0)
 
 
+def record_of(done: Record, drive: Drive, touch: Touch, share: Scalar) -> Record:
+    """A record with a time step among obstacles, which is a share of the control period."""
+    hit = touch.impacts > 0.0
+    return Record(
+        done.power + share * drive.power,
+        done.impulse_x + touch.impulse[0],
+        done.impulse_y + touch.impulse[1],
+        done.pressing + touch.pressing,
+        where(hit, touch.point[0], done.point_x),
+        where(hit, touch.point[1], done.point_y),
+        done.impacts + touch.impacts,
+        maximum(drive.asks.traction, done.traction),
+        maximum(drive.asks.lifted, done.lifted),
+        *touch.held,
+        maximum(touch.impact_traction, done.impact_traction),
+    )
+
+
 def relative_effort(torque: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
     """Sum of squared torques as shares of their limits, and number of driven motors, of one caster."""
     roll, steer = torque[0] / caster.roll_max_torque, torque[1] / caster.steer_max_torque
@@ -284,20 +309,6 @@ def observe(
     return each(observed, (), numbers + casters + ahead + flatten(each(neighbour_seen, (state,), nearest)))
 
 
-def greatest_traction(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
-    """Largest share of the floor's friction that any wheel uses under the given motor torques; above 1 it slips."""
-    at_joints = each(joint_torques, (), torques, robot.casters)
-    v_rate = forward_dynamics(state.twist, state.directions, at_joints, (0.0, 0.0, 0.0), robot)
-    shared = (state.twist, v_rate, robot.platform.coulomb_speed)
-    forces = each(ground_force, shared, state.directions, robot.casters, at_joints)
-    return greatest(each(wheel_use, (robot.platform,), forces, wheel_loads(state.directions, robot)))
-
-
-def wheel_use(platform: PlatformParameters, force: tuple[Scalar, Scalar], load: Scalar) -> Scalar:
-    """Share of the floor's friction that one wheel uses."""
-    return traction_use(force, load, platform.floor_friction)
-
-
 class Endings(NamedTuple):
     """Why an episode has failed; each 1 or 0."""
 
@@ -318,7 +329,6 @@ class Report(NamedTuple):
     position_error: Scalar  # [m]
     heading_sin: Scalar  # of the heading error
     heading_cos: Scalar
-    traction_use: Scalar  # [-]
     conditioning: Scalar  # [-]
     terms: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
     pose: tuple[Scalar, Scalar, Scalar, Scalar]  # x, y, cos β, sin β in W
@@ -344,7 +354,6 @@ def report(
         sqrt(distance_square(errors)),
         errors.sin,
         errors.cos,
-        greatest_traction(state, torques, robot),
         conditioning(state.directions, robot),
         terms,
         state.position + state.heading,
@@ -356,21 +365,11 @@ def report(
 
 def flat_report(told: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> tuple[Scalar, ...]:
     """The report and the motor torques as one row."""
-    errors = (told.position_error, told.heading_sin, told.heading_cos, told.traction_use, told.conditioning)
+    errors = (told.position_error, told.heading_sin, told.heading_cos, told.conditioning)
     poses = told.pose + told.reference_pose
-    ended, record, situation = told.endings, told.record, told.situation
-    happened = (
-        record.power,
-        record.impulse_x,
-        record.impulse_y,
-        record.pressing,
-        record.point_x,
-        record.point_y,
-        record.impacts,
-    )
-    where_it_is = (situation.progress, situation.share, situation.clearance)
+    ended = told.endings
     flags = (ended.left_corridor, ended.not_finite, ended.touched)
-    return flags + errors + told.terms + poses + happened + where_it_is + flatten(torques)
+    return flags + errors + told.terms + poses + told.record[:] + told.situation[:] + flatten(torques)
 
 
 def start(

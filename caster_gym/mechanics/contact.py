@@ -1,17 +1,21 @@
 """A time step among obstacles: impacts found inside it, impulses, and contacts that last. docs/equations.md, section O.
 
-A step is cut into segments that end where the robot first touches something. At such an end impulses (C1)–(C4) act at
-all contacts in turn until none approaches. A contact that lasts is a force over the segment instead, as great as keeps
-it from approaching, so that the robot slides and rests without bouncing. Whatever happens, the number of segments is
-bounded, and the robot only ever moves to where it has been found free: what time is left then is not walked.
+A step is cut into segments that end where the robot first touches something. At such an end impulses act at all
+contacts until none approaches. A contact that lasts is a force over the segment instead, as great as keeps it from
+approaching, so that the robot slides and rests without bouncing. Whatever happens, the number of segments is bounded,
+and the robot only ever moves to where it has been found free: what time is left then is not walked.
+
+This is the robot whose wheels roll without slip, also through impacts: `inertia` is what answers to impulses.
 """
 
 from typing import Any, NamedTuple
 
 from caster_gym.mechanics.contact_impulses import hold, press
-from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.dynamics import forward_dynamics, inertia
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
+from caster_gym.mechanics.ground import FloorUse, floor_use, impact_traction
 from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, unit, unpack_state
+from caster_gym.mechanics.motors import caster_power
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, add, anywhere, each, maximum, minimum, total, where
 from caster_gym.mechanics.separation import TOUCH, Hull, Obstacles, contact_points, separation
@@ -28,6 +32,10 @@ class Touch(NamedTuple):
     pressing: Scalar  # [N s] sum of all normal impulses
     point: tuple[Scalar, Scalar]  # [m] in W, where the last impact was; what it was before, if there was none
     impacts: Scalar  # how many faster than RESTING
+    asks: FloorUse  # the most that is asked of the floor at the start of a segment
+    held: Vector  # [N, N, N m] wrench of lasting contacts on the robot in the last segment, at C, in B
+    work: Scalar  # [J] of the motors
+    impact_traction: Scalar  # [-] greatest share of the floor's friction that a wheel used in an impact
 
 
 def lift(state: State, hull: Hull, obstacles: Obstacles, first: Any, end: Any) -> tuple[State, Scalar]:
@@ -60,6 +68,12 @@ def lift(state: State, hull: Hull, obstacles: Obstacles, first: Any, end: Any) -
     return State((x, y), (c, s), state.twist, state.directions), nearest
 
 
+def power_of(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
+    """Mechanical power of all motors under torques at the joints. [W]"""
+    (power,) = total(each(caster_power, (state.twist,), state.directions, robot.casters, torques))
+    return power
+
+
 def holding_force(
     state: State,
     torques: tuple[tuple[Scalar, Scalar], ...],
@@ -71,13 +85,13 @@ def holding_force(
     first: Any,
     end: Any,
 ) -> tuple[Vector, Scalar]:
-    """Wrench in B of lasting contacts that keeps them from approaching over h seconds, and its normal impulse. (O7)"""
+    """Wrench in B of lasting contacts that keeps them from approaching over h seconds, and its normal impulse. (O10)"""
     v = state.twist
     a = forward_dynamics(v, state.directions, torques, wrench, robot)
     free = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     c, s = state.heading
     heading = unit((c - s * v[2] * h, s + c * v[2] * h))
-    held, normal = hold(free, state, heading, robot, hull, obstacles, first, end)
+    held, normal = hold(free, state, heading, inertia(state.directions, robot), hull, obstacles, first, end)
     rate = 1.0 / maximum(h, 1e-9)
     return (held[0] * rate, held[1] * rate, held[2] * rate), normal
 
@@ -94,8 +108,10 @@ def land(
     end: Any,
 ) -> tuple[State, Touch]:
     """State and record after the impulses on those who land."""
-    bounced, hits = press(state, restitution, robot, hull, obstacles, first, end)
-    twist = each(where, (lands,), bounced, state.twist)
+    bounced, hits = press(state, inertia(state.directions, robot), restitution, hull, obstacles, first, end)
+    v = state.twist
+    used = impact_traction((bounced[0] - v[0], bounced[1] - v[1], bounced[2] - v[2]), state.directions, robot)
+    twist = each(where, (lands,), bounced, v)
     c, s = state.heading
     jx, jy = c * hits.wrench[0] - s * hits.wrench[1], s * hits.wrench[0] + c * hits.wrench[1]
     px, py = hits.point
@@ -107,6 +123,10 @@ def land(
         touch.pressing + where(acted, hits.normal, 0.0 * jx),
         (where(struck, at[0], touch.point[0]), where(struck, at[1], touch.point[1])),
         touch.impacts + where(struck, 1.0 + 0.0 * jx, 0.0 * jx),
+        touch.asks,
+        touch.held,
+        touch.work,
+        where(struck, maximum(used, touch.impact_traction), touch.impact_traction),
     )
 
 
@@ -124,7 +144,9 @@ def guarded_step(
     """One step of h seconds like `rk4_step`, among the obstacles first … end − 1."""
     nothing = 0.0 * (state.twist[0] + h)
     left, trial, landing = h + nothing, h + nothing, nothing
-    touch = Touch((nothing, nothing), nothing, (nothing, nothing), nothing)
+    none = (nothing, nothing, nothing)
+    asked = FloorUse(nothing, nothing)
+    touch = Touch((nothing, nothing), nothing, (nothing, nothing), nothing, asked, none, nothing, nothing)
     for i in range(SEGMENTS):
         lifted, nearest = lift(state, hull, obstacles, first, end)
         push, pressing = (nothing, nothing, nothing), nothing
@@ -141,8 +163,19 @@ def guarded_step(
         c, s = target.heading
         share = where(walks, trial, nothing)
         impulse = (share * (c * push[0] - s * push[1]), share * (s * push[0] + c * push[1]))
+        asks = floor_use(lifted.twist, lifted.directions, torques, add(wrench, push), robot)
         touch = Touch(
-            add(touch.impulse, impulse), touch.pressing + where(walks, pressing, nothing), touch.point, touch.impacts
+            add(touch.impulse, impulse),
+            touch.pressing + where(walks, pressing, nothing),
+            touch.point,
+            touch.impacts,
+            FloorUse(
+                where(walks, maximum(asks.traction, touch.asks.traction), touch.asks.traction),
+                where(walks, maximum(asks.lifted, touch.asks.lifted), touch.asks.lifted),
+            ),
+            each(where, (walks,), push, touch.held),
+            touch.work + 0.5 * share * (power_of(lifted, torques, robot) + power_of(target, torques, robot)),
+            touch.impact_traction,
         )
         state = unpack_state(each(where, (walks,), pack_state(target), pack_state(state)))
         if anywhere(lands):

@@ -1,13 +1,27 @@
 """Operational-space dynamics M v̇ + h = F of the whole robot. Derivation: docs/equations.md, section D.
 
-The constraint forces do no work, so each body's inertia reaches the platform through the rows g of its joints alone,
-and nothing is inverted that could become singular. v̇ is the derivative of the components of v in B.
+The constraint forces do no work, so that each caster reaches the platform through its pivot alone, where it is felt as
+a mass that differs along and across its wheel; nothing is inverted that could become singular. v̇ is the derivative of
+the components of v in B. Along and across mean along f and f⊥.
 """
 
-from caster_gym.mechanics.caster import rate_drifts, rate_rows, rates
+from typing import NamedTuple
+
+from caster_gym.mechanics.caster import pivot_velocity, rates
 from caster_gym.mechanics.linear import dot, multiply, solve
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Symmetric, Vector, add, each, sqrt, total
+
+
+class PivotInertia(NamedTuple):
+    """Inertia of one caster as felt at its pivot, for the velocity of the pivot and the platform's yaw rate."""
+
+    along: Scalar  # [kg]
+    cross: Scalar  # [kg]
+    across: Scalar  # [kg]
+    along_turn: Scalar  # [kg m] with the yaw rate, through the rotors
+    across_turn: Scalar  # [kg m]
+    turn: Scalar  # [kg m²]
 
 
 def caster_inertias(caster: CasterParameters) -> tuple[Scalar, Scalar, Scalar]:
@@ -18,55 +32,63 @@ def caster_inertias(caster: CasterParameters) -> tuple[Scalar, Scalar, Scalar]:
     return rolling, caster.link_mass * r * sigma, yaw
 
 
-def caster_inertia(f: Direction, caster: CasterParameters) -> Symmetric:
-    """Contribution of one caster to M."""
-    eta, theta, delta = rate_rows(f, caster)
+def pivot_inertia(caster: CasterParameters) -> PivotInertia:
+    """What one caster adds to the platform at its pivot; the same for every δ."""
     i_tt, i_te, i_ee = caster_inertias(caster)
-    j = caster.steer_armature
-    # (D3): column sums first, then the symmetric product
-    t = (i_tt * theta[0] + i_te * eta[0], i_tt * theta[1] + i_te * eta[1], i_tt * theta[2] + i_te * eta[2])
-    e = (i_te * theta[0] + i_ee * eta[0], i_te * theta[1] + i_ee * eta[1], i_te * theta[2] + i_ee * eta[2])
-    return (
-        t[0] * theta[0] + e[0] * eta[0] + j * delta[0] * delta[0],
-        t[0] * theta[1] + e[0] * eta[1] + j * delta[0] * delta[1],
-        t[0] * theta[2] + e[0] * eta[2] + j * delta[0] * delta[2],
-        t[1] * theta[1] + e[1] * eta[1] + j * delta[1] * delta[1],
-        t[1] * theta[2] + e[1] * eta[2] + j * delta[1] * delta[2],
-        t[2] * theta[2] + e[2] * eta[2] + j * delta[2] * delta[2],
+    j, k = caster.steer_armature, caster.cross_armature
+    r, d = caster.radius, caster.trail
+    aside = caster.offset / d
+    along, both = i_tt / (r * r), (i_te + k) / (r * d)  # (D6)
+    cross = both - aside * along
+    along_turn = -k / r
+    return PivotInertia(
+        along, cross, (i_ee + j) / (d * d) - aside * (both + cross), along_turn, -j / d - aside * along_turn, j
     )
 
 
-def caster_bias(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
-    """Contribution of one caster to h."""
-    row_eta, row_theta, row_delta = rate_rows(f, caster)
-    eta, theta, _ = rates(v, f, caster)
-    e_eta, e_theta, e_delta = rate_drifts(v, f, caster)
-    i_tt, i_te, i_ee = caster_inertias(caster)
+def caster_inertia(f: Direction, caster: CasterParameters) -> Symmetric:
+    """Contribution of one caster to M."""
+    c, s = f
+    x, y = caster.x, caster.y
+    p = pivot_inertia(caster)
+    cc, ss, cs = c * c, s * s, c * s
+    skew = 2.0 * p.cross * cs
+    xx = p.along * cc - skew + p.across * ss  # (D3)
+    xy = (p.along - p.across) * cs + p.cross * (cc - ss)
+    yy = p.along * ss + skew + p.across * cc
+    turn_x, turn_y = p.along_turn * c - p.across_turn * s, p.along_turn * s + p.across_turn * c
+    xz = x * xy - y * xx + turn_x
+    yz = x * yy - y * xy + turn_y
+    return xx, xy, xz, yy, yz, x * (yz + turn_y) - y * (xz + turn_x) + p.turn
+
+
+def off_axis_forces(eta: Scalar, theta: Scalar, caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    """Forces n at θ and η of a link whose mass centre lies off the axle. [N m]"""
     n = caster.off_axis * caster.link_mass * caster.radius * (caster.trail - caster.link_behind)
-    n_theta, n_eta = -n * eta * eta, n * theta * eta  # (D1)
-    b_theta = i_tt * e_theta + i_te * e_eta + n_theta  # (D2)
-    b_eta = i_te * e_theta + i_ee * e_eta + n_eta
-    b_delta = caster.steer_armature * e_delta
-    return combine(row_theta, b_theta, row_eta, b_eta, row_delta, b_delta)  # (D4)
+    return -n * eta * eta, n * theta * eta  # (D1)
 
 
-def caster_resistance(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
-    """Generalised force that friction in one caster's joints and contact patch takes from the platform."""
-    row_eta, row_theta, row_delta = rate_rows(f, caster)
-    eta, theta, delta = rates(v, f, caster)
-    roll = joint_friction(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed)
-    steer = joint_friction(delta, caster.steer_viscous, caster.steer_coulomb, coulomb_speed)
-    return combine(row_theta, roll, row_eta, caster.scrub * eta, row_delta, steer)
-
-
-def caster_drive(f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]) -> Vector:
-    """Generalised force of the torques at one caster's rolling and steering joints."""
-    _, theta, delta = rate_rows(f, caster)
-    roll, steer = torque
+def turning_forces(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
+    """Forces along, across [N] and at ω [N m] that turn one caster's momentum at constant twist."""
+    a, b = pivot_velocity(v, f, caster)
+    _, _, delta = rates(v, f, caster)
+    p, a_rate, b_rate = pivot_inertia(caster), b * delta, -a * delta
     return (
-        theta[0] * roll + delta[0] * steer,
-        theta[1] * roll + delta[1] * steer,
-        theta[2] * roll + delta[2] * steer,
+        p.along * a_rate + p.cross * b_rate,  # (D2)
+        p.cross * a_rate + p.across * b_rate,
+        p.along_turn * a_rate + p.across_turn * b_rate,
+    )
+
+
+def friction_torques(
+    v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Torques that overcome friction at one caster's rolling and steering joints, and under its wheel. [N m]"""
+    eta, theta, delta = rates(v, f, caster)
+    return (
+        joint_friction(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed),
+        joint_friction(delta, caster.steer_viscous, caster.steer_coulomb, coulomb_speed),
+        caster.scrub * eta,
     )
 
 
@@ -75,13 +97,52 @@ def joint_friction(rate: Scalar, viscous: Scalar, coulomb: Scalar, coulomb_speed
     return viscous * rate + coulomb * rate / sqrt(rate * rate + coulomb_speed * coulomb_speed)
 
 
-def combine(g: Vector, x: Scalar, h: Vector, y: Scalar, k: Vector, z: Scalar) -> Vector:
-    """g x + h y + k z."""
-    return (
-        g[0] * x + h[0] * y + k[0] * z,
-        g[1] * x + h[1] * y + k[1] * z,
-        g[2] * x + h[2] * y + k[2] * z,
-    )
+def at_pivot(theta: Scalar, eta: Scalar, caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    """Force along and across at the pivot of forces at one caster's θ and η. [N]"""
+    along = theta / caster.radius
+    return along, (eta - caster.offset * along) / caster.trail
+
+
+def at_platform(along: Scalar, across: Scalar, turn: Scalar, f: Direction, caster: CasterParameters) -> Vector:
+    """Generalised force at C of a force at one caster's pivot and a moment at ω."""
+    c, s = f
+    x, y = c * along - s * across, s * along + c * across
+    return x, y, caster.x * y - caster.y * x + turn
+
+
+def caster_bias(v: Vector, f: Direction, caster: CasterParameters) -> Vector:
+    """Contribution of one caster to h."""
+    eta, theta, _ = rates(v, f, caster)
+    n_theta, n_eta = off_axis_forces(eta, theta, caster)
+    along, across = at_pivot(n_theta, n_eta, caster)
+    turning = turning_forces(v, f, caster)
+    return at_platform(along + turning[0], across + turning[1], turning[2], f, caster)  # (D4)
+
+
+def caster_resistance(v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters) -> Vector:
+    """Generalised force that friction in one caster's joints and contact patch takes from the platform."""
+    roll, steer, scrub = friction_torques(v, coulomb_speed, f, caster)
+    along, across = at_pivot(roll, steer + scrub, caster)
+    return at_platform(along, across, -steer, f, caster)
+
+
+def caster_drive(f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]) -> Vector:
+    """Generalised force of the torques at one caster's rolling and steering joints."""
+    along, across = at_pivot(torque[0], torque[1], caster)
+    return at_platform(along, across, -torque[1], f, caster)
+
+
+def caster_force(
+    v: Vector, coulomb_speed: Scalar, f: Direction, caster: CasterParameters, torque: tuple[Scalar, Scalar]
+) -> Vector:
+    """What is left of one caster's drive after its friction and its contribution to h."""
+    eta, theta, _ = rates(v, f, caster)
+    roll, steer, scrub = friction_torques(v, coulomb_speed, f, caster)
+    n_theta, n_eta = off_axis_forces(eta, theta, caster)
+    drive = torque[1] - steer
+    along, across = at_pivot(torque[0] - roll - n_theta, drive - scrub - n_eta, caster)
+    turning = turning_forces(v, f, caster)
+    return at_platform(along - turning[0], across - turning[1], -drive - turning[2], f, caster)
 
 
 def platform_inertia(platform: PlatformParameters) -> Symmetric:
@@ -112,13 +173,6 @@ def resistance(v: Vector, directions: tuple[Direction, ...], robot: RobotParamet
     return total(each(caster_resistance, (v, robot.platform.coulomb_speed), directions, robot.casters))
 
 
-def drive_force(
-    directions: tuple[Direction, ...], torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters
-) -> Vector:
-    """Generalised force Σ (g_θ τ_θ + g_δ τ_δ) of all joint torques."""
-    return total(each(caster_drive, (), directions, robot.casters, torques))
-
-
 def forward_dynamics(
     v: Vector,
     directions: tuple[Direction, ...],
@@ -127,14 +181,9 @@ def forward_dynamics(
     robot: RobotParameters,
 ) -> Vector:
     """Twist rate under joint torques (rolling, steering) per caster and an external wrench at C. (D5)"""
-    drive = drive_force(directions, torques, robot)
-    h = bias(v, directions, robot)
-    lost = resistance(v, directions, robot)
-    force = (
-        drive[0] + wrench[0] - h[0] - lost[0],
-        drive[1] + wrench[1] - h[1] - lost[1],
-        drive[2] + wrench[2] - h[2] - lost[2],
-    )
+    push = total(each(caster_force, (v, robot.platform.coulomb_speed), directions, robot.casters, torques))
+    h = platform_bias(v, robot.platform)
+    force = (push[0] + wrench[0] - h[0], push[1] + wrench[1] - h[1], push[2] + wrench[2] - h[2])
     return solve(inertia(directions, robot), force)
 
 

@@ -4,8 +4,9 @@ Joint rates turn the motors through `gear`: motor speeds = gear · (θ̇, δ̇).
 go back through its transpose: joint torques = gearᵀ · motor torques. The motors' limits hold at the motors.
 """
 
+from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.parameters import CasterParameters
-from caster_gym.mechanics.scalars import Scalar, clip
+from caster_gym.mechanics.scalars import Direction, Scalar, Vector, clip
 
 
 def motor_speeds(joint_rates: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
@@ -46,3 +47,9 @@ def joint_torques(motor: tuple[Scalar, Scalar], caster: CasterParameters) -> tup
     """Torques at a caster's rolling and steering joints from those of its motors. [N m]"""
     roll, steer = motor  # (M2)
     return caster.gear_rr * roll + caster.gear_sr * steer, caster.gear_rs * roll + caster.gear_ss * steer
+
+
+def caster_power(v: Vector, f: Direction, caster: CasterParameters, torques: tuple[Scalar, Scalar]) -> tuple[Scalar]:
+    """Mechanical power of the torques at a caster's joints, which is that of its motors. [W] (M2)"""
+    theta, delta = joint_rates(v, f, caster)
+    return (torques[0] * theta + torques[1] * delta,)

@@ -20,6 +20,7 @@ class PlatformParameters(NamedTuple):
     inertia: Scalar  # [kg m²]
     com_x: Scalar  # [m]
     com_y: Scalar  # [m]
+    height: Scalar  # [m] of the mass centre above the floor
     floor_friction: Scalar  # [-] between the wheels and the floor
     coulomb_speed: Scalar  # [rad/s] rate of a joint below which its dry friction fades to zero
 
@@ -39,8 +40,9 @@ class CasterParameters(NamedTuple):
     link_inertia: Scalar  # I_l [kg m²]
     link_behind: Scalar  # l [m] mass centre behind the steering axis
     link_left: Scalar  # q [m] and to its left
-    roll_armature: Scalar  # J_θ [kg m²]
-    steer_armature: Scalar  # J_δ [kg m²]
+    roll_armature: Scalar  # J_θ [kg m²] of rotors and gears, seen at the rolling joint
+    steer_armature: Scalar  # J_δ [kg m²] seen at the steering joint
+    cross_armature: Scalar  # J_θδ [kg m²] through which rotors couple both joints
     roll_viscous: Scalar  # [N m s/rad]
     roll_coulomb: Scalar  # [N m]
     steer_viscous: Scalar
@@ -75,7 +77,9 @@ def robot_parameters(robot: Robot, dynamics: Dynamics = "exact") -> RobotParamet
     if dynamics not in ("exact", "chung2008"):
         raise ValueError(f'dynamics must be "exact" or "chung2008", got {dynamics!r}')
     p = robot.platform
-    platform = PlatformParameters(p.mass, p.inertia, p.com[0], p.com[1], robot.floor_friction, robot.coulomb_speed)
+    platform = PlatformParameters(
+        p.mass, p.inertia, p.com[0], p.com[1], p.height, robot.floor_friction, robot.coulomb_speed
+    )
     casters = tuple(
         caster_parameters(caster, f"roll_{i}" in robot.driven, f"steer_{i}" in robot.driven, dynamics)
         for i, caster in enumerate(robot.casters, start=1)
@@ -86,6 +90,7 @@ def robot_parameters(robot: Robot, dynamics: Dynamics = "exact") -> RobotParamet
 def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamics = "exact") -> CasterParameters:
     """The numbers of one caster whose rolling and steering joints are driven or not."""
     wheel, link, (gear_roll, gear_steer) = caster.wheel, caster.link, caster.gear
+    rotors = caster.roll.rotor, caster.steer.rotor
     return CasterParameters(
         x=caster.x,
         y=caster.y,
@@ -99,8 +104,9 @@ def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamic
         link_inertia=link.inertia,
         link_behind=link.com[0],
         link_left=link.com[1],
-        roll_armature=caster.roll.armature,
-        steer_armature=caster.steer.armature,
+        roll_armature=caster.roll.armature + rotors[0] * gear_roll[0] ** 2 + rotors[1] * gear_steer[0] ** 2,  # (M4)
+        steer_armature=caster.steer.armature + rotors[0] * gear_roll[1] ** 2 + rotors[1] * gear_steer[1] ** 2,
+        cross_armature=rotors[0] * gear_roll[0] * gear_roll[1] + rotors[1] * gear_steer[0] * gear_steer[1],
         roll_viscous=caster.roll.viscous,
         roll_coulomb=caster.roll.coulomb,
         steer_viscous=caster.steer.viscous,
@@ -121,9 +127,17 @@ def caster_parameters(caster: Caster, roll: bool, steer: bool, dynamics: Dynamic
 
 
 def with_load(
-    platform: PlatformParameters, mass: Scalar, x: Scalar, y: Scalar, inertia: Scalar = 0.0
+    platform: PlatformParameters,
+    mass: Scalar,
+    x: Scalar,
+    y: Scalar,
+    inertia: Scalar = 0.0,
+    height: Scalar | None = None,
 ) -> PlatformParameters:
-    """A platform and a load of a mass [kg] at (x, y) in B [m], with an inertia about its own mass centre [kg m²]."""
+    """A platform and a load of a mass [kg] at (x, y) in B [m], with an inertia about its own mass centre [kg m²].
+
+    height: of the load's mass centre above the floor [m]; None: as high as the platform's.
+    """
     together = platform.mass + mass
     away_x, away_y = x - platform.com_x, y - platform.com_y
     apart = platform.mass * mass / together * (away_x * away_x + away_y * away_y)  # about their common mass centre
@@ -132,6 +146,7 @@ def with_load(
         inertia=platform.inertia + inertia + apart,
         com_x=platform.com_x + mass / together * away_x,
         com_y=platform.com_y + mass / together * away_y,
+        height=platform.height if height is None else platform.height + mass / together * (height - platform.height),
     )
 
 

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.contact import Touch, guarded_step
+from caster_gym.mechanics.ground import FloorUse, floor_use
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.motors import joint_torques, motor_speeds, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
@@ -16,6 +17,7 @@ class Drive(NamedTuple):
 
     torques: tuple[tuple[Scalar, Scalar], ...]  # of each caster's two motors [N m]
     power: Scalar  # mean mechanical power of all motors [W]
+    asks: FloorUse  # of the floor, at the start
 
 
 def motor_power(
@@ -31,15 +33,15 @@ def all_motor_speeds(state: State, robot: RobotParameters) -> tuple[tuple[Scalar
     return each(motor_speeds, (), rates, robot.casters)
 
 
-def drive_between(
+def power_between(
     before: tuple[tuple[Scalar, Scalar], ...],
     torques: tuple[tuple[Scalar, Scalar], ...],
     end: State,
     robot: RobotParameters,
-) -> Drive:
-    """The record of a time step from the motor speeds at its start, the motor torques and the state at its end."""
+) -> Scalar:
+    """Mean mechanical power of all motors in a step from its torques and the motor speeds at its start. [W]"""
     (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot)))
-    return Drive(torques, power)
+    return power
 
 
 def driven_step(
@@ -48,8 +50,10 @@ def driven_step(
     """One RK4 step of h seconds under motor commands in −1 … 1, limited at the speeds of the step's start."""
     before = all_motor_speeds(state, robot)
     torques = each(motor_torques, (), commands, before, robot.casters)
-    end = rk4_step(state, each(joint_torques, (), torques, robot.casters), wrench, h, robot)
-    return end, drive_between(before, torques, end, robot)
+    at_joints = each(joint_torques, (), torques, robot.casters)
+    asks = floor_use(state.twist, state.directions, at_joints, wrench, robot)
+    end = rk4_step(state, at_joints, wrench, h, robot)
+    return end, Drive(torques, power_between(before, torques, end, robot), asks)
 
 
 def guarded_driven_step(
@@ -68,4 +72,4 @@ def guarded_driven_step(
     torques = each(motor_torques, (), commands, before, robot.casters)
     at_joints = each(joint_torques, (), torques, robot.casters)
     end, touch = guarded_step(state, at_joints, wrench, h, robot, hull, obstacles, first, last)
-    return end, drive_between(before, torques, end, robot), touch
+    return end, Drive(torques, touch.work / h, touch.asks), touch

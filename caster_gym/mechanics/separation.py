@@ -33,6 +33,7 @@ class Obstacles(NamedTuple):
     spans: Any  # int64 (K, 4): first face and the end of the faces, first corner and the end of the corners
     restitution: Any  # [-] 0 … 1
     friction: Any  # [-] between robot and obstacles
+    law: Any = 0.0  # of the impulse of a single contact, one of `impulse.LAWS`
 
 
 class Surroundings(NamedTuple):

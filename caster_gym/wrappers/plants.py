@@ -43,6 +43,7 @@ class Payload(Feature):
     x: Range = 0.0  # [m] its mass centre, forward of C
     y: Range = 0.0  # [m] and left of C
     inertia: NonNegativeFloat = 0.0  # [kg m²] about a vertical axis through its mass centre; 0: a point
+    height: Size | None = None  # [m] of its mass centre above the floor; null: as high as the platform's
 
     def runtime(self, place: Place) -> Runtime:
         """Platforms with loads."""
@@ -95,23 +96,24 @@ class _Payload(PlantRuntime):
         self._feature = feature
 
     def rebuild(self, parameters: Array, seeds: Seeds) -> Array:
-        shares = uniforms(seeds, np.arange(3))
+        shares = uniforms(seeds, np.arange(4))
         return self._loaded(parameters, shares)
 
     def extremes(self, parameters: Array) -> Array:
         """The lightest load, at each corner: more mass makes everything slower."""
-        corners = np.array([(0.0, x, y) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)])
+        corners = np.array([(0.0, x, y, 0.0) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)])
         rows = np.repeat(parameters, len(corners), axis=0)
         return self._loaded(rows, np.tile(corners, (len(parameters), 1)))
 
     def _loaded(self, parameters: Array, shares: Array) -> Array:
-        """Robots with loads at shares (k, 3) of the ranges of mass, x and y."""
+        """Robots with loads at shares (k, 4) of the ranges of mass, x, y and height."""
         feature = self._feature
         added = between(feature.mass, shares[:, 0])
         x, y = between(feature.x, shares[:, 1]), between(feature.y, shares[:, 2])
         bare = PlatformParameters(*parameters[:, :PLATFORM_FIELDS].T)
         rebuilt = parameters.copy()
-        rebuilt[:, :PLATFORM_FIELDS] = np.stack(with_load(bare, added, x, y, feature.inertia), axis=1)
+        z = None if feature.height is None else between(feature.height, shares[:, 3])
+        rebuilt[:, :PLATFORM_FIELDS] = np.stack(with_load(bare, added, x, y, feature.inertia, z), axis=1)
         return rebuilt
 
 
