@@ -152,7 +152,7 @@ def test_loads_shift_as_under_a_platform_that_can_tip(name, share, pushes):
 
 
 def test_a_wheel_is_about_to_lift_where_mujoco_says_so():
-    """XR4000 at full torque, whose casters steer as they roll: with its mass centre at 0.35 m one wheel carries nothing.
+    """XR4000 at full torque, whose casters steer as they roll: with its mass centre at 0.35 m a wheel carries nothing.
 
     Opposite wheels then share a tenth of the mean load as the contacts yield, and as they ring. At 0.2 m all carry.
     """
