@@ -120,8 +120,8 @@ def draw_convergence(file: Path, comparisons: list[Comparison]) -> None:
     figure.savefig(file, dpi=150)
 
 
-def page(comparisons: list[Comparison], creeps: list[Creep], folder: str, command: str) -> str:
-    """The comparison as Markdown; pictures and tables lie in a folder beside it."""
+def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> str:
+    """The comparison as Markdown; pictures and tables lie beside it."""
     coarse, fine = 1e3 * STEPS[0], 1e3 * STEPS[-1]
     heads = (
         "robot",
@@ -152,13 +152,13 @@ def page(comparisons: list[Comparison], creeps: list[Creep], folder: str, comman
     draws = max(Counter(one.robot for one in comparisons).values())
     libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "mujoco", "numpy"))
     parts = [
-        "# Truth by somebody else's code",
+        "# Truth by somebody else's code: MuJoCo's motion",
         paragraph(
             """MuJoCo is given the same robots as rigid bodies: a platform that slides and turns in the plane, steering
             links, and wheels that are spheres on a plane, held from sliding by the friction of its contact solver
-            ([mjcf.py](../caster_gym/export/mjcf.py)). It knows joints, masses and contacts, but none of the equations
-            in [equations.md](equations.md). Its contacts are soft over a few time steps, so its wheels creep a little,
-            and less with every smaller step."""
+            ([mjcf.py](../../caster_gym/export/mjcf.py)). It knows joints, masses and contacts, but none of the
+            equations in [equations.md](../equations.md). Its contacts are soft over a few time steps, so its wheels
+            creep a little, and less with every smaller step."""
         ),
         paragraph(
             f"""Each robot is driven {draws} times from rest for {DURATION:g} s, with wheels askew and constant torques,
@@ -167,7 +167,7 @@ def page(comparisons: list[Comparison], creeps: list[Creep], folder: str, comman
             since MuJoCo's jumps at rest where ours passes smoothly: see below."""
         ),
         "\n".join(lines),
-        f"Medians over the drives, least and greatest in brackets; [all of them]({folder}/convergence.csv).",
+        "Medians over the drives, least and greatest in brackets; [all of them](convergence.csv).",
         paragraph(
             f"""As its step goes to zero, MuJoCo ends where the exact model ends: each half step leaves half of the
             distance, and what is left after extrapolating to no step is its error of second order. From the model
@@ -175,7 +175,7 @@ def page(comparisons: list[Comparison], creeps: list[Creep], folder: str, comman
             of {len(comparisons)} drives MuJoCo's finest step ends at least twice as close to the exact model as to the
             one without (D1)."""
         ),
-        f"![Distance of MuJoCo's end from both models' ends, over MuJoCo's time step]({folder}/convergence.png)",
+        "![Distance of MuJoCo's end from both models' ends, over MuJoCo's time step](convergence.png)",
         paragraph(
             """*Thin lines are single drives, thick ones their medians. Blue falls in proportion to MuJoCo's step, as
             the dotted line does: the exact model is its limit. Orange levels off: without (D1) the equations describe
@@ -225,7 +225,7 @@ def spread(values: Any) -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Compare, and write the page DIR.md with what belongs to it in DIR."""
+    """Compare, and write a page with what belongs to it into a folder."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robots", nargs="+", default=list(ROBOTS), help="names or files")
     parser.add_argument("--draws", type=int, default=DRAWS, help="drives of each robot")
@@ -239,7 +239,7 @@ def main(arguments: list[str] | None = None) -> None:
     write_table(chosen.out / "convergence.csv", comparisons)
     draw_convergence(chosen.out / "convergence.png", comparisons)
     command = shlex.join(["python", "-m", "scripts.mujoco_peer", *(sys.argv[1:] if arguments is None else arguments)])
-    chosen.out.with_suffix(".md").write_text(page(comparisons, creeps, chosen.out.name, command), encoding="utf-8")
+    (chosen.out / "mujoco.md").write_text(page(comparisons, creeps, command), encoding="utf-8")
 
 
 if __name__ == "__main__":

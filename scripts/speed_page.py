@@ -194,7 +194,7 @@ def accuracy_text(accuracy: Accuracy, robot: str) -> str:
         to {100.0 * STRONG:.0f} % of the weight on its wheel. The error is the distance from where RK4 at a tiny step
         ends. Drive by drive MuJoCo's is {shown(middle(over))} times ours at {1e3 * RK4_STEP:g} ms, and at least
         {shown(float(over.min()))} times; its wheels slip by {slips:.2f} % of their way. That its limit is ours as its
-        step goes to zero is shown in [truth.md](truth.md)."""
+        step goes to zero is shown in [mujoco.md](truth/mujoco.md)."""
     heads = ("position after the drive", "median error", "middle half", "greatest")
     return f"{paragraph(text)}\n\n{table(heads, lines)}"
 

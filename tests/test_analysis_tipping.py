@@ -17,19 +17,22 @@ def standing(name, height):
 
 
 def test_the_least_load_is_that_of_full_torque_in_the_worst_direction():
-    robot = standing("xr4000", 0.2)
+    robot = standing("xr4000", 0.12)
     load, wheel, acceleration, direction = least_load(robot)
     model = Model(robot)
-    torque = np.zeros((72, 8))
+    torque = np.zeros((144, 8))
     torque[:, ::2] = 4.27  # N m of every rolling motor, which the gear also turns by half against the steering
     torque[:, 1::2] = -0.5 * 4.27
-    angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
-    loads = model.wheel_loads(np.tile(angles[:, None], 4), np.zeros((72, 3)), torque)
+    torque[72:] *= -1.0  # braking
+    angles = np.tile(np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False), 2)
+    loads = model.wheel_loads(np.tile(angles[:, None], 4), np.zeros((144, 3)), torque)
     assert_allclose(load, loads.min(), rtol=0.05)  # other directions are tried
-    rate = model.forward_dynamics(np.full(4, direction), np.zeros(3), torque[0])
-    assert_allclose(np.hypot(*rate[:2]), acceleration, rtol=1e-12)
-    here = model.wheel_loads(np.full(4, direction), np.zeros(3), torque[0])
-    assert_allclose(here[wheel - 1], load, rtol=1e-9)
+    rates = model.forward_dynamics(np.tile(angles[:, None], 4), np.zeros((144, 3)), torque)
+    assert_allclose(np.hypot(rates[:, 0], rates[:, 1]).max(), acceleration, rtol=1e-3)  # alike in all directions
+    k = loads.min(axis=1).argmin()
+    turn = direction - np.arctan2(rates[k, 1], rates[k, 0])
+    assert np.cos(4.0 * turn) > 0.9  # the robot looks the same after every quarter turn
+    assert 1 <= wheel <= 4
 
 
 def test_a_floor_that_holds_less_lets_a_robot_lift_less():

@@ -110,11 +110,11 @@ def test_page_tells_what_was_compared(tmp_path):
     write_table(tmp_path / "convergence.csv", [one])
     draw_convergence(tmp_path / "convergence.png", [one])
     assert len((tmp_path / "convergence.csv").read_text().splitlines()) == 1 + len(STEPS)
-    text = page([one], [creep(load_robot("xr4000"))], "truth", "python -m scripts.mujoco_peer")
+    text = page([one], [creep(load_robot("xr4000"))], "python -m scripts.mujoco_peer")
     assert "| chung2008 | 1.4 " in text
     assert "In 1 of 1 drives" in text
     assert "| xr4000 | 0.1 | " in text
-    assert "Dry friction does not hold" not in page([one], [], "truth", "")  # of robots that have none
+    assert "Dry friction does not hold" not in page([one], [], "")  # of robots that have none
 
 
 @pytest.mark.parametrize("name", ["tidybot2", "xr4000"])

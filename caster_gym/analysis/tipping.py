@@ -1,4 +1,4 @@
-"""Does a robot lift wheels when it drives off at full torque? (G5), (G7) of docs/equations.md say so."""
+"""Does a robot lift wheels when it drives off or brakes at full torque? (G5), (G7) of docs/equations.md say so."""
 
 import warnings
 from functools import lru_cache
@@ -12,42 +12,44 @@ from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import each
 from caster_gym.robot import Robot
 
-_DIRECTIONS = 64  # in which it is tried, forwards and backwards
+_DIRECTIONS = 64  # in which it is tried
 
 
 class LiftWarning(UserWarning):
-    """A robot that drives off at full torque lifts a wheel."""
+    """A robot that drives off or brakes at full torque lifts a wheel."""
 
 
 @lru_cache(maxsize=128)
 def least_load(robot: Robot) -> tuple[float, int, float, float]:
-    """Least load [N] of a wheel as the robot drives off, that wheel (from 1), the acceleration [m/s²], its direction.
+    """Least load [N] of a wheel, that wheel (from 1), the acceleration [m/s²] that does it, and its direction [rad].
 
-    All casters stand alike, in some direction of B [rad], and all rolling motors give their greatest torque, or as much
-    as the floor's friction allows the whole robot. A negative load says that the robot tips over.
+    All casters trail in some direction of B, and all rolling motors give their greatest torque forwards, or backwards
+    to brake, or as much as the floor's friction allows the whole robot. A negative load says that the robot tips over.
     """
     parameters = robot_parameters(robot)
-    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    angles = np.tile(2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS, 2)
+    sense = np.repeat((1.0, -1.0), _DIRECTIONS)
     f = np.cos(angles), np.sin(angles)
     directions, still = (f,) * robot.caster_count, (0.0, 0.0, 0.0)
-    motors = tuple((caster.roll_active * caster.roll_max_torque, 0.0) for caster in parameters.casters)
+    motors = tuple((sense * caster.roll_active * caster.roll_max_torque, 0.0) for caster in parameters.casters)
     torques = each(joint_torques, (), motors, parameters.casters)
     rate = np.array(np.broadcast_arrays(*forward_dynamics(still, directions, torques, still, parameters)))
     size = np.hypot(rate[0], rate[1])
     rate *= np.minimum(1.0, parameters.platform.floor_friction * GRAVITY / np.maximum(size, 1e-300))
     loads = np.array(wheel_loads(directions, tilt(still, tuple(rate), directions, still, parameters), parameters))
     wheel, k = np.unravel_index(loads.argmin(), loads.shape)
-    return float(loads[wheel, k]), int(wheel) + 1, float(np.hypot(rate[0, k], rate[1, k])), float(angles[k])
+    ahead, left = rate[:2, k]
+    return float(loads[wheel, k]), int(wheel) + 1, float(np.hypot(ahead, left)), float(np.arctan2(left, ahead))
 
 
 def warn_if_lifting(robot: Robot) -> None:
-    """Warn if a wheel leaves the floor as the robot drives off at full torque."""
+    """Warn if a wheel leaves the floor as the robot drives off or brakes at full torque."""
     load, wheel, acceleration, direction = least_load(robot)
     if load <= 0.0:
         warnings.warn(
             f"robot {robot.name!r}, whose platform has its mass centre {robot.platform.height:g} m above the floor, "
-            f"lifts wheel {wheel} when it drives off at {acceleration:.2g} m/s² along {np.degrees(direction):.0f}°, as "
-            "its rolling motors and the floor allow; these equations keep all wheels on the floor, and "
+            f"lifts wheel {wheel} when it accelerates by {acceleration:.2g} m/s² along {np.degrees(direction):.0f}°, "
+            "as its rolling motors and the floor allow; these equations keep all wheels on the floor, and "
             'info["wheels_lifted"] tells when they do not stay there',
             LiftWarning,
             stacklevel=3,
