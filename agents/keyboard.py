@@ -40,6 +40,7 @@ class KeyboardDriver(ComputedTorque):
     def __init__(self, layout: ObservationLayout, period: float, held: Held) -> None:
         super().__init__(layout, SLOWING, period)
         self._held = held
+        self._rate = -np.expm1(-SLOWING * period) / period  # held for a period, it leaves exp(−SLOWING · period)
         self._greatest = greatest_twist(layout.robot)
 
     @property
@@ -48,7 +49,7 @@ class KeyboardDriver(ComputedTorque):
         return "keyboard"
 
     def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
-        rate: Array = SLOWING * (self._greatest * wanted_shares(self._held()) - twist)
+        rate: Array = self._rate * (self._greatest * wanted_shares(self._held()) - twist)
         return rate
 
 

@@ -50,14 +50,14 @@ def lacks(path: AnyPath, robot: Robot, models: Sequence[KnownModel], period: flo
     fastest = (np.hypot(coarse[..., 4], coarse[..., 5]) + reach * np.abs(coarse[..., 6])).max()
     parts = int(np.ceil(fastest * period / (_STEP * min(caster.trail for caster in robot.casters))))
     fine = np.stack([one.samples for one in path.trajectories(period / parts)])
-    steering = trailing_steering(fine, robot)[:, ::parts]
+    steering = trailing_steering(fine, period / parts, robot)[:, ::parts]
     return [[_lack(*one, robot, known) for one in zip(coarse, steering, strict=True)] for known in models]
 
 
-def trailing_steering(samples: Array, robot: Robot) -> Array:
-    """Angles (P, K + 1, N) of trailing casters [rad]."""
+def trailing_steering(samples: Array, time_step: float, robot: Robot) -> Array:
+    """Angles (P, K + 1, N) of trailing casters [rad]; time step in s."""
     back = samples[..., 2] - 1j * samples[..., 3]
-    return np.angle(trailing_directions(samples, robot) * back[..., None])
+    return np.angle(trailing_directions(samples, time_step, robot) * back[..., None])
 
 
 def _lack(samples: Array, steering: Array, robot: Robot, known: KnownModel) -> Lack:

@@ -130,7 +130,10 @@ class TrailingStarts(EqualStarts):
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Like every batch; the observation tells of the casters as they then stand."""
         observations, info = super().reset(seed=seed, options=options)
-        first = [trailing_steering(table[None], self.robot)[0, 0] for table in self.engine.plan.tables]
+        first = [
+            trailing_steering(table[None], self.task.control_period, self.robot)[0, 0]
+            for table in self.engine.plan.tables
+        ]
         steering = np.array(first)[self.engine.paths]
         directions = np.stack([np.cos(steering), np.sin(steering)], axis=-1).reshape(self.num_envs, -1)
         states = self.engine.states

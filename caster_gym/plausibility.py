@@ -76,6 +76,8 @@ def _platform_doubts(robot: "Robot") -> Iterator[_Doubt]:
     )
     away = float((platform.com[0] ** 2 + platform.com[1] ** 2) ** 0.5)
     yield from _outside("platform.com", away, "m from C", 0.0, reach, f"outside of the outline of {reach:.2g} m")
+    tall = f"where the outline reaches {reach:.2g} m from C; usual are 0.3 … 2 of that"
+    yield from _outside("platform.height", platform.height, "m", 0.0, 10.0 * reach, tall)
     if any(motor.coulomb > 0.0 for caster in robot.casters for motor in (caster.roll, caster.steer)):
         slowest = min(min(caster.roll.max_speed, caster.steer.max_speed) for caster in robot.casters)
         yield from _outside(
@@ -174,6 +176,11 @@ def _motor_doubts(caster: "Caster", robot: "Robot") -> Iterator[_Doubt]:
         seems = motor.armature / arm**2
         usual = f"which seems to weigh {seems:.2g} kg on the floor, the robot {whole:.2g} kg"
         yield from _outside(f"{name}.armature", motor.armature, "kg m²", 0.0, heavy * whole * arm**2, usual)
+        seems = motor.rotor * ratio**2 / arm**2
+        usual = (
+            f"which through a gear of {ratio:.3g} seems to weigh {seems:.2g} kg on the floor, the robot {whole:.2g} kg"
+        )
+        yield from _outside(f"{name}.rotor", motor.rotor, "kg m²", 0.0, heavy * whole * arm**2 / ratio**2, usual)
         yield from _friction_doubts(name, motor, ratio)
     grip = _GRAVITY * whole * caster.radius
     yield from _outside(

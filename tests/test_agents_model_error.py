@@ -33,7 +33,7 @@ def test_the_power_of_what_a_model_lacks_is_the_rate_of_the_energy_that_it_lacks
         trajectories = path.trajectories(step)
         for one, missing in zip(trajectories, lacks(path, ROBOT, [known], step)[0], strict=True):
             samples = one.samples
-            steering = trailing_steering(samples[None], ROBOT)[0]
+            steering = trailing_steering(samples[None], PERIOD, ROBOT)[0]
             back = samples[:, 2] - 1j * samples[:, 3]
             velocity, push = (back * (x[:, 0] + 1j * x[:, 1]) for x in (samples[:, 4:6], missing.push))
             twist = np.stack([velocity.real, velocity.imag, samples[:, 6]], axis=1)

@@ -18,10 +18,10 @@ from caster_gym.analysis.design import (
     redesigned,
     wheel_room,
 )
-from caster_gym.analysis.envelope import envelope_loads
+from caster_gym.analysis.envelope import envelope_loads, motor_uses
 from caster_gym.analysis.isotropy import global_isotropies
 from caster_gym.analysis.joint_sets import classify
-from caster_gym.analysis.sizing import motor_uses, require
+from caster_gym.analysis.sizing import require
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.robot import Robot
 from tests.random_robots import random_robot

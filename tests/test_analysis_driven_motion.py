@@ -67,17 +67,17 @@ def test_wheels_go_where_they_point_as_far_as_they_roll(robot):
         assert_allclose(way * (middle / np.abs(middle)).conj(), along, atol=3e-6)
 
 
-def test_steering_agrees_with_the_exact_map_of_straight_ways():
-    """(F2) against the paths' own casters, whose error falls with the square of the turn in one step."""
+def test_steering_agrees_with_the_maps_along_paths():
+    """(F2) against the paths' own casters, whose error falls with the fourth power of the step."""
     errors = []
-    for time_step in (0.004, 0.002):
+    for time_step in (0.04, 0.02):
         trajectory = ELLIPSE.trajectories(time_step)[0]
         motion = lead(trajectory, CHUNG)
-        directions = trailing_directions(trajectory.samples[None], CHUNG)[0]
+        directions = trailing_directions(trajectory.samples[None], trajectory.time_step, CHUNG)[0]
         apart = np.abs(np.exp(1j * (motion.steering + motion.pose[:, 2:])) - directions)
         errors.append(apart[len(apart) // 2 :].max())  # metres after the start, which those guess otherwise
-    assert errors[1] < 1e-5  # a turn of some 0.003 rad in a step, squared
-    assert_allclose(errors[0] / errors[1], 4.0, rtol=0.05)
+    assert errors[1] < 1e-5
+    assert errors[0] / errors[1] > 10.0
 
 
 def test_casters_started_anywhere_come_to_trail():

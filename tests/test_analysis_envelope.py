@@ -15,11 +15,11 @@ from caster_gym.analysis.envelope import (
     envelope_loads,
     flip_speed,
     least_possible_share,
+    motor_uses,
     path_loads,
     placed,
     sampled_motions,
 )
-from caster_gym.analysis.sizing import motor_uses
 from caster_gym.analysis.target import Target
 from caster_gym.paths.feasibility import motor_use
 from caster_gym.paths.specification import read_paths
@@ -145,6 +145,6 @@ def test_paths_ask_what_the_feasibility_of_paths_says():
     trajectories = [one for path in paths for one in path.trajectories(0.02)]
     for trajectory in trajectories:
         ours = motor_uses(path_loads([trajectory], ROBOT), ROBOT, 1.0).max()
-        assert ours == pytest.approx(motor_use([trajectory], ROBOT).use[0], rel=1e-9)  # sums in another order
+        assert ours == pytest.approx(motor_use([trajectory], ROBOT).use[0], rel=1e-4)  # by which either may miss a peak
     together = motor_uses(path_loads(trajectories, ROBOT), ROBOT, 1.0).max()
-    assert together == pytest.approx(motor_use(trajectories, ROBOT).use.max(), rel=1e-9)
+    assert together == pytest.approx(motor_use(trajectories, ROBOT).use.max(), rel=1e-4)

@@ -5,12 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
-from caster_gym.analysis.envelope import Loads, envelope_loads, sampled_motions
+from caster_gym.analysis.envelope import Loads, driven_motors, envelope_loads, motor_uses, sampled_motions
 from caster_gym.analysis.sizing import (
-    driven_motors,
     harder_motions,
     motor_shares,
-    motor_uses,
     require,
     sized,
     smallest_motor,

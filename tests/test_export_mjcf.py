@@ -9,12 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from caster_gym import load_robot
+from caster_gym import Model, load_robot
 from caster_gym.agents.cli import app
 from caster_gym.export.mjcf import mjcf
 from tests.random_robots import random_robot
 
 STEP = 2e-3  # [s]
+ROBOTS = ("chung2008", "tidybot2", "xr4000")
 
 
 def compiled(robot, **options):
@@ -52,6 +53,116 @@ GEARS = {
     "one motor on both joints": ((1.0, -0.4), (0.0, 1.0)),
     "both on both": ((1.0, 0.5), (-0.5, 1.0)),
 }
+
+
+def rolling_mass_matrix(robot, model, steering, rng):
+    """MuJoCo's mass matrix of all bodies and rotors (3, 3), for velocities at which the wheels roll without slip."""
+    data = mujoco.MjData(model)
+    index = {model.joint(i).name: int(model.jnt_dofadr[i]) for i in range(model.njnt)}
+    for number, angle in enumerate(steering, start=1):
+        data.qpos[index[f"steer_{number}"]] = angle
+        data.qpos[index[f"roll_{number}"]] = rng.uniform(-3.0, 3.0)
+    mujoco.mj_forward(model, data)
+    whole = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, whole)
+    rolling = np.zeros((model.nv, 3))
+    rolling[[index["x"], index["y"], index["yaw"]]] = np.eye(3)
+    rolling[[index[joint] for joint in robot.joints]] = Model(robot).jacobian(steering)
+    return rolling.T @ whole @ rolling
+
+
+def with_rotors(gear):
+    """A robot of three unlike casters with rotors and armatures, of which not all joints are driven."""
+    robot = geared(gear)
+    casters = []
+    for i, caster in enumerate(robot.casters):
+        roll = caster.roll.model_copy(update={"rotor": 2e-3 * (i + 1)})
+        steer = caster.steer.model_copy(update={"rotor": 5e-4, "armature": 3e-4 * i})
+        casters.append(caster.model_copy(update={"roll": roll, "steer": steer, "offset": 0.003 * i}))
+    return robot.model_copy(update={"casters": tuple(casters), "actuation": ("roll_1", "steer_1", "roll_2")})
+
+
+@pytest.mark.parametrize("robot", [*map(load_robot, ROBOTS), *map(with_rotors, GEARS.values())], ids=[*ROBOTS, *GEARS])
+def test_its_mass_matrix_is_that_of_the_equations(robot):
+    """Rotors included, whether their motors are driven or not: rounding of sums over all bodies."""
+    rng, model = np.random.default_rng(0), compiled(robot)
+    for steering in rng.uniform(-np.pi, np.pi, (10, robot.caster_count)):
+        ours = Model(robot).inertia(steering)
+        theirs = rolling_mass_matrix(robot, model, steering, rng)
+        assert_allclose(theirs, ours, rtol=0.0, atol=1e-12 * np.abs(ours).max())
+
+
+def without_dry_friction(robot, **platform):
+    """MuJoCo's holds, so that it is left out; the platform may be changed."""
+    kept = []
+    for caster in robot.casters:
+        roll, steer = (motor.model_copy(update={"coulomb": 0.0}) for motor in (caster.roll, caster.steer))
+        kept.append(caster.model_copy(update={"roll": roll, "steer": steer}))
+    changed = {"casters": tuple(kept), "platform": robot.platform.model_copy(update=platform)}
+    return robot.model_copy(update=changed)
+
+
+def loads_on_wheels(robot, share, push, angle=0.3, step=2e-4):
+    """Normal forces (N,) of MuJoCo's contacts and of the model, means over 40 ms in which the robot accelerates.
+
+    A free platform settles, then all rolling motors give a share of their torque, and a push (2,) [N] in W acts at its
+    mass centre. The mean is taken 40 ms later, when contacts have stopped to ring.
+    """
+    model = mujoco.MjModel.from_xml_string(mjcf(robot, step, tips=True))
+    data, ours, count = mujoco.MjData(model), Model(robot), robot.caster_count
+    index = {model.joint(i).name: int(model.jnt_dofadr[i]) for i in range(model.njnt)}
+    steers = [index[f"steer_{i + 1}"] for i in range(count)]
+    data.qpos[steers] = angle
+    mujoco.mj_step(model, data, round(0.3 / step))
+    motors = np.array([[share * caster.roll.max_torque, 0.0] for caster in robot.casters])
+    data.ctrl[:] = motors.ravel()
+    data.xfrc_applied[model.body("platform").id, :2] = push
+    mujoco.mj_step(model, data, round(0.04 / step))
+    torque = np.concatenate([np.array(c.gear).T @ pair for c, pair in zip(robot.casters, motors, strict=True)])
+    seen, expected, force = [], [], np.zeros(6)
+    for _ in range(round(0.04 / step)):
+        mujoco.mj_step(model, data)
+        loads = np.zeros(count)
+        for k in range(data.ncon):
+            mujoco.mj_contactForce(model, data, k, force)
+            wheel = max(int(model.geom_bodyid[geom]) for geom in (data.contact[k].geom1, data.contact[k].geom2))
+            loads[int(model.body(wheel).name.removeprefix("wheel_")) - 1] += force[0]
+        back = np.exp(-1j * data.qpos[index["yaw"]])
+        velocity = back * complex(data.qvel[index["x"]], data.qvel[index["y"]])
+        felt = back * complex(*push)
+        twist = velocity.real, velocity.imag, data.qvel[index["yaw"]]
+        seen.append(loads)
+        expected.append(ours.wheel_loads(data.qpos[steers], twist, torque, (felt.real, felt.imag, 0.0)))
+    return np.mean(seen, axis=0), np.mean(expected, axis=0), ours.wheel_loads(np.full(count, angle))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(("share", "pushes"), [(0.5, (0.0, 0.0)), (0.0, (0.05, 0.1)), (0.4, (0.0, -0.1))])
+def test_loads_shift_as_under_a_platform_that_can_tip(name, share, pushes):
+    """Under acceleration and a push, with a free platform: exact for three wheels, four rest on a floor that yields.
+
+    Then 1 % of the mean load is left, in the mode in which two opposite wheels carry more and the others less.
+    """
+    robot = without_dry_friction(load_robot(name))
+    weight = 9.81 * robot.platform.mass
+    seen, expected, rest = loads_on_wheels(robot, share, weight * np.array(pushes))
+    assert np.abs(expected - rest).max() > 0.01 * rest.mean()  # they do shift
+    exact = robot.caster_count == 3
+    assert_allclose(seen, expected, rtol=0.0, atol=(1e-3 if exact else 0.015) * rest.mean())
+
+
+def test_a_wheel_is_about_to_lift_where_mujoco_says_so():
+    """XR4000 at full torque, whose casters steer as they roll: with its mass centre at 0.35 m a wheel carries nothing.
+
+    Opposite wheels then share a tenth of the mean load as the contacts yield, and as they ring. At 0.2 m all carry.
+    """
+    robot = load_robot("xr4000")
+    for height, near, least in ((0.2, 0.02, 0.3), (0.35, 0.12, -0.01)):
+        seen, expected, rest = loads_on_wheels(without_dry_friction(robot, height=height), 1.0, np.zeros(2), angle=0.0)
+        assert_allclose(seen, expected, rtol=0.0, atol=near * rest.mean())
+        assert min(seen.min(), expected.min()) > least * rest.mean()
+    assert seen.min() < 0.1 * rest.mean()
+    assert expected.min() < 0.02 * rest.mean()
 
 
 @pytest.mark.parametrize("gear", GEARS.values(), ids=GEARS)

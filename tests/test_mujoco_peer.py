@@ -47,11 +47,14 @@ def test_mujoco_converges_to_the_equations():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_mujoco_converges_for_a_robot_of_which_nothing_is_zero(seed):
-    """Offsets, mass centres, armatures, viscous friction, scrub, a motion at the start; four unlike casters."""
+    """Offsets, mass centres, rotors, armatures, viscous friction, scrub, a motion at the start; four unlike casters.
+
+    For a second: one of them is then led past a posture from which casters may flip either way.
+    """
     robot = solid_wheels(without_dry_friction(random_robot(seed, 4)))
     rng = np.random.default_rng(seed)
     state = np.concatenate(([0.1, -0.2, 0.5, 0.3, -0.2, 0.5], rng.uniform(-np.pi, np.pi, 4)))
-    assert_limit_is_exact(robot, state, rng.uniform(-0.3, 0.3, 8), 2.0)
+    assert_limit_is_exact(robot, state, rng.uniform(-0.3, 0.3, 8), 1.0)
 
 
 @pytest.mark.parametrize("name", ["tidybot2", "xr4000"])
@@ -123,4 +126,4 @@ def test_creep_below_breakaway_is_that_of_the_law(name):
     assert missing[0] < 0.15  # viscous · rate is 6 % of the load on xr4000, 5 % on tidybot2 at 0.06 rad/s; the start
     assert missing[-1] < 0.01
     assert found.substeps[0] < found.substeps[-1]
-    assert found.peer < 0.25 * found.ways[0]  # MuJoCo's constraint holds
+    assert found.peer < 0.3 * found.ways[0]  # MuJoCo's constraint holds, as softly as all of them

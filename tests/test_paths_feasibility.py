@@ -7,8 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
+from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.paths import build_trajectories, read_paths
-from caster_gym.paths.feasibility import check_feasible, motor_use
+from caster_gym.paths.feasibility import check_feasible, motor_use, motor_uses_at
+from caster_gym.paths.moments import sampled
 from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import COLUMNS, Trajectory
 from caster_gym.robot import Robot
@@ -36,24 +38,26 @@ def in_body(samples):
     return twist, np.stack([w[0] + omega * v[1], w[1] - omega * v[0], alpha], axis=1)
 
 
-def steering_along(samples, robot):
-    directions = trailing_directions(samples[None], robot)[0]
+def steering_along(trajectory, robot):
+    samples = trajectory.samples
+    directions = trailing_directions(samples[None], trajectory.time_step, robot)[0]
     return np.angle(directions / (samples[:, 2] + 1j * samples[:, 3])[:, None])
 
 
 @pytest.mark.parametrize("path", [*DEFAULTS[:4], {"shape": "random_paths", "count": 5}])
 def test_use_is_that_of_the_least_torques_that_give_the_model_its_wrench(path):
-    """An independent way: Jacobian, inverse dynamics and a pseudo-inverse of shares of the greatest torques.
+    """An independent way: Jacobian, inverse dynamics and a pseudo-inverse of shares of the greatest torques, at 2 ms.
 
-    The damping, 1e-6 of the mean square push, changes shares by about as much, hence 1e-4 with room for bad directions.
+    The damping, 1e-6 of the mean square push, changes shares by about as much, hence 1e-4 with room for bad directions;
+    random paths are scaled by their greatest sample, which differs by 3e-4 between 20 ms and 2 ms.
     """
     model = Model(ROBOT)
     size = np.array([[caster.roll.max_torque, caster.steer.max_torque] for caster in ROBOT.casters]).ravel()
     top = np.array([[caster.roll.max_speed, caster.steer.max_speed] for caster in ROBOT.casters]).ravel()
     found = motor_use(trajectories(path), ROBOT)
-    for k, trajectory in enumerate(trajectories(path)):
+    for k, trajectory in enumerate(trajectories(path, 0.002)):
         twist, twist_rate = in_body(trajectory.samples)
-        steering = steering_along(trajectory.samples, ROBOT)
+        steering = steering_along(trajectory, ROBOT)
         push = np.swapaxes(model.jacobian(steering), -1, -2) * size  # wrench of each motor's greatest torque
         length = np.sqrt(np.mean([caster.x**2 + caster.y**2 for caster in ROBOT.casters]))
         weights = np.array([1.0, 1.0, 1.0 / length])
@@ -63,12 +67,117 @@ def test_use_is_that_of_the_least_torques_that_give_the_model_its_wrench(path):
         speed = np.stack([theta, delta], axis=-1).reshape(shares.shape)
         left = 1.0 - np.maximum(np.sign(shares) * speed, 0.0) / top
         use = np.maximum(abs(shares) / left, abs(speed) / top)
-        assert found.use[k] == pytest.approx(use.max(), rel=1e-4)
-        moment, joint = np.unravel_index(use.argmax(), use.shape)
-        assert (found.joint[k], found.time[k]) == (joint, pytest.approx(0.02 * moment))
-        assert found.torque[k] == pytest.approx(size[joint] * shares[moment, joint], rel=1e-4, abs=1e-6)
-        assert found.left[k] == pytest.approx(size[joint] * left[moment, joint])
-        assert found.speed[k] == pytest.approx(speed[moment, joint])
+        assert found.use[k] == pytest.approx(use.max(), rel=1e-4 if len(found.use) == 1 else 5e-4)
+        joint = found.joint[k]
+        moment = round(found.time[k] / 0.002)
+        assert use[moment, joint] == pytest.approx(use.max(), rel=2e-3)  # at most 1 ms away, where the use may fall
+        assert found.torque[k] == pytest.approx(size[joint] * shares[moment, joint], rel=5e-3, abs=1e-9)
+        assert found.left[k] == pytest.approx(size[joint] * left[moment, joint], rel=5e-3)
+        assert found.speed[k] == pytest.approx(speed[moment, joint], rel=5e-3, abs=1e-9)
+
+
+ROBOTS = ("chung2008", "tidybot2", "xr4000")
+WAYPOINTS = ((0.0, 0.0), (0.6, 0.3), (0.9, 1.0), (0.3, 1.4), (-0.5, 0.9), (-0.4, 0.1))
+SPOTS = ((0, 0, 0), (1, 0, 0), (1, 0, 1.5), (1, 1, 1.5), (1, 1, 3.0), (0, 1, 3.0))
+LOG = [(0.05 * k, round(np.cos(0.045 * k), 3), round(np.sin(0.065 * k), 3), round(0.025 * k, 3)) for k in range(120)]
+STOPS = [(0, 0, 0, 0), (1.13, 0.5, 0.1, 0.3), (2.41, 1.2, 0.5, 0.8), (3.33, 1.2, 0.5, 0.8), (4.77, 0.3, 1.1, 0.2)]
+PATHS = {
+    "circle": "circle",
+    "ellipse": "ellipse",
+    "lemniscate": "lemniscate",
+    "spinning": {"shape": "circle", "heading": {"kind": "spinning", "turns": 3}},
+    "waypoints": {"shape": "spline", "waypoints": WAYPOINTS},
+    "turns on the spot": {"shape": "spline", "waypoints": SPOTS},
+    "reversing": {"shape": "random_paths", "count": 1, "seed": 5, "reversing": 1.0},
+    "log": {"shape": "timed", "poses": LOG},
+    "poses with a stop": {"shape": "timed", "poses": STOPS},
+}
+
+
+def paced(path, factor):
+    """A path that is driven in so many times its time."""
+    if path.shape == "timed":
+        return path.model_copy(update={"stretch": factor})
+    changes = {"duration": factor * path.duration}
+    if path.shape == "random_paths":
+        changes |= {"max_speed": 0.8 / factor, "max_acceleration": 1.0 / factor**2, "max_yaw_rate": 1.5 / factor}
+    return path.model_copy(update=changes)
+
+
+def use_at(path, factor, steps_per_second, robot):
+    """Greatest use with so many whole steps that none is rounded away."""
+    slower = paced(path, factor)
+    steps = round(slower.duration * steps_per_second)
+    return motor_use(slower.trajectories(slower.duration / steps), robot).use.max()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("what", PATHS)
+def test_the_shortest_time_for_a_path_is_the_same_for_coarse_and_fine_samples(what, name):
+    """At 20 ms and at 1 ms, on casters with trails of 14 to 20 mm, which pivots pass by far in 20 ms.
+
+    Uses agree to 0.15 % (random paths are scaled by their greatest sample), and no use falls less than the time grows.
+    """
+    robot, (path,) = load_robot(name), read_paths(PATHS[what])
+    low, high = 0.1, 20.0
+    while high > 1.0002 * low:
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if use_at(path, middle, 50.0, robot) <= 1.0 else (middle, high)
+    assert use_at(path, high, 1000.0, robot) <= 1.001
+    assert use_at(path, low / 1.002, 1000.0, robot) > 1.0
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_nothing_between_samples_is_harder_than_what_is_found(name):
+    """Against samples that lie 100 times as close together."""
+    robot = load_robot(name)
+    for path in PATHS.values():
+        (coarse,), (fine,) = trajectories(path, 0.02), trajectories(path, 0.0002)
+        found = motor_use((coarse,), robot).use[0]
+        block = next(sampled((fine,), robot))
+        seen = motor_uses_at(block.motion, robot_parameters(robot)).max()
+        assert seen <= 1.0005 * found, path  # closer samples of a random path scale it by 3e-4
+        assert found <= 1.002 * seen, path
+
+
+def test_a_path_that_a_time_step_slows_down_is_judged_as_it_is_written():
+    """8.690 s are 8.70 s at steps of 25 ms, and too fast; so is 8.71 s of which steps of 20 ms make 8.72 s no news."""
+    tidybot = load_robot("tidybot2")
+    (circle,) = read_paths({"shape": "circle", "duration": 8.685})
+    rounded = motor_use(circle.trajectories(0.1), tidybot).use[0]
+    assert rounded <= 1.0
+    with pytest.raises(ValueError, match="would do"):
+        check_feasible(circle, circle.trajectories(0.1), tidybot)
+
+
+@pytest.mark.parametrize("time_step", [0.002, 0.05])
+@pytest.mark.parametrize("shape", ["circle", "ellipse", "rounded_square"])
+def test_advice_holds_at_other_time_steps_too(shape, time_step):
+    tidybot = load_robot("tidybot2")
+    with pytest.raises(ValueError, match="would do") as error:
+        build_trajectories({"shape": shape, "duration": 4.0}, tidybot, 0.02)
+    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    exact = time_step * np.ceil(duration / time_step)  # a coarse step may shorten it, by half of itself
+    assert build_trajectories({"shape": shape, "duration": exact}, tidybot, time_step)
+
+
+def test_plans_whose_accelerations_jump_are_judged_by_what_they_say():
+    """A bang-bang plan at 50 Hz: a quintic through its samples would swing beyond its accelerations by a sixth."""
+    steps, h = 100, 0.02
+    t = h * np.arange(steps + 1)
+    switch = 0.5 * steps * h + 0.3 * h
+    top = 0.8
+    a = np.where(t < switch, top, -top * switch / (steps * h - switch))
+    v = np.where(t < switch, top * t, top * switch + a * (t - switch))
+    x = np.where(
+        t < switch, 0.5 * top * t**2, 0.5 * top * switch**2 + (top * switch + 0.5 * a * (t - switch)) * (t - switch)
+    )
+    table = np.zeros((steps + 1, len(COLUMNS)))
+    for name, column in (("x", x), ("cos", 1.0), ("vx", v), ("ax", a)):
+        table[:, COLUMNS.index(name)] = column
+    plan = Trajectory("plan", h, table)
+    at_samples = motor_uses_at(next(sampled((plan,), ROBOT)).motion, robot_parameters(ROBOT)).max()
+    assert motor_use((plan,), ROBOT).use[0] == pytest.approx(at_samples, rel=1e-4)
 
 
 def test_defaults_are_feasible_with_room_for_control():

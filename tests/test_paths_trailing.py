@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.interpolate import make_interp_spline
 
 from caster_gym import Model, load_robot
 from caster_gym.paths import read_paths
@@ -24,49 +25,53 @@ def twists_in_body(samples):
     return np.stack([c * vx + s * vy, c * vy - s * vx, omega], axis=1)
 
 
-def steering_along(samples, robot):
-    directions = trailing_directions(samples[None], robot)[0]
+def steering_along(samples, time_step, robot):
+    directions = trailing_directions(samples[None], time_step, robot)[0]
     return np.angle(directions / (samples[:, 2] + 1j * samples[:, 3])[:, None])
 
 
 @pytest.mark.parametrize("path", ["lemniscate", {"shape": "circle", "heading": "spinning"}])
-def test_casters_trail_as_the_steering_rates_of_the_model_say(path):
-    """RK4 of δ̇ from the model on a table of 1 ms, its step 2 ms, against the map at 20 ms and at 10 ms.
+@pytest.mark.parametrize("name", ["chung2008", "tidybot2"])
+def test_casters_trail_as_the_steering_rates_of_the_model_say(path, name):
+    """DOP853 on δ̇ of the model, the motion by quintics through a table of 1 ms, against the map at 20 ms and at 10 ms.
 
-    RK4 errs by less than 1e-6 here; the map by the square of its step: 1e-3 rad at 20 ms and a quarter at 10 ms.
+    In a step of 20 ms the pivots of tidybot2 move by two of its trails: a map by chords is off by half of their turn.
     """
-    model = Model(ROBOT)
+    robot = load_robot(name)
+    model = Model(robot)
     (exact,) = trajectories(path, 0.001)
-    twist = twists_in_body(exact.samples)
-    h, angle = 0.002, steering_along(exact.samples, ROBOT)[0]
-    history = [angle]
-    for k in range(0, len(twist) - 2, 2):
-        k1 = model.rates(angle, twist[k])[2]
-        k2 = model.rates(angle + 0.5 * h * k1, twist[k + 1])[2]
-        k3 = model.rates(angle + 0.5 * h * k2, twist[k + 1])[2]
-        k4 = model.rates(angle + h * k3, twist[k + 2])[2]
-        angle = angle + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        history.append(angle)
+    twist = make_interp_spline(0.001 * np.arange(len(exact.samples)), twists_in_body(exact.samples), k=5)
+    times = np.arange(1.0, exact.duration - 1.0, 0.02)  # at rest directions are those of ways that are lost in rounding
     errors = []
     for time_step in (0.02, 0.01):
         (coarse,) = trajectories(path, time_step)
-        steering = steering_along(coarse.samples, ROBOT)
-        expected = np.array(history)[:: round(time_step / h)]
-        # The first motion is as small as t³, so that its direction at the very start is lost in rounding.
-        errors.append(abs(np.angle(np.exp(1j * (steering - expected))))[25:].max())
-    assert errors[0] < 4e-3
-    assert errors[0] / errors[1] > 3.0
+        steering = steering_along(coarse.samples, time_step, robot)[:: round(0.02 / time_step)]
+        start = steering[50]
+        solution = solve_ivp(
+            lambda t, angle: model.rates(angle, twist(t))[2],
+            times[[0, -1]],
+            start,
+            "DOP853",
+            times,
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        expected = solution.y.T
+        found = steering[50 : 50 + len(expected)]
+        errors.append(abs(np.angle(np.exp(1j * (found - expected)))).max())
+    assert errors[0] < 2e-5  # rad
+    assert errors[0] / errors[1] > 3.0 or errors[0] < 1e-7  # arcs are exact
 
 
 def test_casters_point_along_a_straight_line_from_the_start():
     (line,) = trajectories({"shape": "spline", "waypoints": [(0, 0), (3, 4)], "heading": "fixed"})
-    assert_allclose(trailing_directions(line.samples[None], ROBOT), 0.6 + 0.8j, atol=1e-9)  # first way of 1e-6 m
+    assert_allclose(trailing_directions(line.samples[None], 0.02, ROBOT), 0.6 + 0.8j, atol=1e-9)  # first way of 1e-6 m
 
 
 def test_pivots_that_never_move_keep_their_casters_ahead():
     still = np.zeros((1, 11, len(COLUMNS)))
     still[..., COLUMNS.index("cos")] = 1.0
-    assert_allclose(trailing_directions(still, ROBOT), 1.0, atol=0.0)
+    assert_allclose(trailing_directions(still, 0.02, ROBOT), 1.0, atol=0.0)
 
 
 def turning_line(steps, intervals=20, length=2.0, turns=4.0):

@@ -16,9 +16,17 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, PositiveFloat
 
 from caster_gym.analysis.actuation import SINGULAR, worst_conditioning
-from caster_gym.analysis.envelope import Motions, envelope_loads, joined, path_loads, sampled_motions
+from caster_gym.analysis.envelope import (
+    Motions,
+    driven_motors,
+    envelope_loads,
+    joined,
+    motor_uses,
+    path_loads,
+    sampled_motions,
+)
 from caster_gym.analysis.isotropy import global_isotropies
-from caster_gym.analysis.sizing import driven_motors, harder_motions, motor_shares, motor_uses, trajectories_of
+from caster_gym.analysis.sizing import harder_motions, motor_shares, trajectories_of
 from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
 from caster_gym.paths.trajectory import Trajectory, rounded_down
 from caster_gym.robot import Robot
@@ -296,7 +304,7 @@ class _Search:
             return float(self._isotropies(np.array([radius]), np.array([trail]))[0])
         full = loaded(redesigned(self.robot, radius, trail), self.target)
         parts = [envelope_loads(self.motions, full, self.target)]
-        parts += [path_loads(self.paths, full)] if self.paths else []
+        parts += [path_loads(self.paths, full, self.target.margin)] if self.paths else []
         measure = motor_uses if self.target.objective == "use" else motor_shares
         return max(float(measure(part, full, self.target.margin).max()) for part in parts)
 

@@ -16,25 +16,26 @@ has it: torques are shares of each motor's greatest, and the sum of their square
 """
 
 from collections.abc import Sequence
-from itertools import combinations, groupby
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.analysis.frames import motion_in_body, rate_in_body
+from caster_gym.analysis.frames import rate_in_body
 from caster_gym.analysis.target import Target
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import inertia, inverse_dynamics
 from caster_gym.mechanics.linear import dot
-from caster_gym.mechanics.motors import motor_speeds
+from caster_gym.mechanics.motors import motor_speeds, torque_range
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten
 from caster_gym.paths.feasibility import least_effort
-from caster_gym.paths.trailing import trailing_directions
+from caster_gym.paths.moments import Motion, hard_spans, moments_within, motion_at, sampled
+from caster_gym.paths.moments import joined as joined_spans
 from caster_gym.paths.trajectory import Trajectory
-from caster_gym.robot import Robot
+from caster_gym.robot import Motor, Robot
 
 Array = NDArray[np.float64]
 
@@ -115,20 +116,58 @@ def envelope_loads(motions: Motions, robot: Robot, target: Target) -> Loads:
     return _loads(steady, reach, _speeds(v, f, robot, parameters))
 
 
-def path_loads(trajectories: Sequence[Trajectory], robot: Robot) -> Loads:
-    """What trajectories ask of the driven motors at each of their samples, their casters trailing."""
+def path_loads(trajectories: Sequence[Trajectory], robot: Robot, margin: float = 1.0) -> Loads:
+    """What trajectories ask of the driven motors at each of their samples, casters trailing, and between samples.
+
+    There it looks at moments at which a measure of some motor may be greater than at all samples.
+    """
     parameters = robot_parameters(robot)
-    parts = []
-    for _, group in groupby(trajectories, key=lambda one: (len(one.samples), one.time_step)):
-        samples = np.stack([trajectory.samples for trajectory in group])
-        psi = trailing_directions(samples, robot)
-        psi, samples = psi.reshape(-1, psi.shape[-1]), samples.reshape(-1, samples.shape[-1])
-        v, rate = (_columns(part) for part in motion_in_body(samples))
-        back = samples[:, 2] - 1j * samples[:, 3]
-        f = tuple((one.real, one.imag) for one in (psi * back[:, None]).T)
-        torques = _motor_torques(inverse_dynamics(v, f, rate, parameters), f, robot, parameters)
-        parts.append(_loads(torques, np.zeros_like(torques), _speeds(v, f, robot, parameters)))
-    return together(parts)
+    blocks = list(sampled(trajectories, robot))
+    values = [measures(_motion_loads(block.motion, robot, parameters), robot, margin) for block in blocks]
+    greatest = np.maximum.reduce([found.max(axis=(1, 2), keepdims=True) for found in values])
+    scale = 1.0 / np.where(greatest > 0.0, greatest, 1.0)
+    best = np.ones(len(trajectories))
+    spans = [hard_spans(block, scale * found, best, robot) for block, found in zip(blocks, values, strict=True)]
+    motions = [block.motion for block in blocks]
+    closer = moments_within(
+        joined_spans(spans), best, lambda m: scale * measures(_motion_loads(m, robot, parameters), robot, margin), robot
+    )
+    motions += [motion_at(moments.rows, moments.psi) for moments in closer]
+    loads = [_motion_loads(motion, robot, parameters) for motion in motions]
+    return together([Loads(*(part.reshape(len(part), -1) for part in one)) for one in loads])
+
+
+def _motion_loads(motion: Motion, robot: Robot, parameters: RobotParameters) -> Loads:
+    """Loads (J, ...) of a motion."""
+    v, rate, f = motion
+    torques = _motor_torques(inverse_dynamics(v, f, rate, parameters), f, robot, parameters)
+    return _loads(torques, np.zeros_like(torques), _speeds(v, f, robot, parameters))
+
+
+def measures(loads: Loads, robot: Robot, margin: float) -> Array:
+    """Use, torque, speed and power of every motor (4 J, ...)."""
+    uses = np.nan_to_num(motor_uses(loads, robot, margin), posinf=0.0)
+    torque = np.maximum(loads.along, loads.against)
+    return np.concatenate([uses, torque, loads.speed, loads.along * loads.speed])
+
+
+def driven_motors(robot: Robot) -> list[Motor]:
+    """The motors of the driven joints."""
+    motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
+    return [motors[robot.joints.index(joint)] for joint in robot.driven]
+
+
+def motor_uses(loads: Loads, robot: Robot, margin: float) -> Array:
+    """Use (J, ...) of each driven motor with a margin: 1 is the limit, infinite at and beyond its top speed. (S5)"""
+    motors, shape = driven_motors(robot), (-1, *(1,) * (loads.speed.ndim - 1))
+    sizes, tops = (
+        np.array(column).reshape(shape) for column in zip(*((m.max_torque, m.max_speed) for m in motors), strict=True)
+    )
+    low, high = torque_range(margin * loads.speed, sizes, tops)
+    with np.errstate(divide="ignore"):
+        along = np.where(high > 0.0, margin * loads.along / np.where(high > 0.0, high, 1.0), np.inf)
+    uses: Array = np.maximum(along, margin * loads.against / -low)
+    return uses
 
 
 def together(parts: Sequence[Loads]) -> Loads:

@@ -12,17 +12,19 @@ from numpy.typing import NDArray
 from caster_gym.analysis.envelope import (
     Loads,
     Motions,
+    driven_motors,
     envelope_loads,
     joined,
     least_possible_share,
+    measures,
+    motor_uses,
     path_loads,
     sampled_motions,
     together,
 )
 from caster_gym.analysis.target import Target, check_actuation, check_conditioning, driven_as, loaded
-from caster_gym.mechanics.motors import torque_range
 from caster_gym.paths.trajectory import Trajectory
-from caster_gym.robot import Motor, Robot
+from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -74,25 +76,9 @@ class Requirement:
         return max(motor.standstill_torque / motor.has_torque for motor in self.motors)
 
 
-def driven_motors(robot: Robot) -> list[Motor]:
-    """The motors of the driven joints."""
-    motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-    return [motors[robot.joints.index(joint)] for joint in robot.driven]
-
-
 def trajectories_of(target: Target) -> tuple[Trajectory, ...]:
     """The timed trajectories of the target's paths. Raises ValueError for a path that cannot be timed."""
     return tuple(one for path in target.paths for one in path.trajectories(target.time_step))
-
-
-def motor_uses(loads: Loads, robot: Robot, margin: float) -> Array:
-    """Use (J, S) of each driven motor with a margin: 1 is the limit, infinite at and beyond its top speed. (S5)"""
-    sizes, tops = np.array([(motor.max_torque, motor.max_speed) for motor in driven_motors(robot)]).T[:, :, None]
-    low, high = torque_range(margin * loads.speed, sizes, tops)
-    with np.errstate(divide="ignore"):
-        along = np.where(high > 0.0, margin * loads.along / np.where(high > 0.0, high, 1.0), np.inf)
-    uses: Array = np.maximum(along, margin * loads.against / -low)
-    return uses
 
 
 def motor_shares(loads: Loads, robot: Robot, margin: float) -> Array:
@@ -117,7 +103,7 @@ def require(robot: Robot, target: Target, motions: Motions | None = None) -> Req
     envelope = envelope_loads(hardest, full, target)
     parts = [envelope]
     if paths := trajectories_of(target):
-        parts.append(path_loads(paths, full))
+        parts.append(path_loads(paths, full, target.margin))
     loads = together(parts)
     motors = driven_motors(full)
     k = target.margin
@@ -149,14 +135,14 @@ def harder_motions(motions: Motions, robot: Robot, target: Target) -> Motions:
     A random search with a fixed seed, whose step shrinks; it never returns to something easier.
     """
     rng = np.random.default_rng(0)
-    measures = _measures(envelope_loads(motions, robot, target), robot, target.margin)
-    parts = [range(start, measures.shape[1], _STARTS) for start in range(_STARTS)]
-    worst = np.concatenate([np.array(part)[measures[:, part].argmax(axis=1)] for part in parts])
+    known = measures(envelope_loads(motions, robot, target), robot, target.margin)
+    parts = [range(start, known.shape[1], _STARTS) for start in range(_STARTS)]
+    worst = np.concatenate([np.array(part)[known[:, part].argmax(axis=1)] for part in parts])
     best = Motions(*(part[..., worst] for part in motions))
     rows = np.arange(len(worst))
     for step in _FIRST_STEP * _SHRINKING ** np.arange(_ROUNDS):
         tried = _moved(best, step, rng)
-        values = _measures(envelope_loads(tried, robot, target), robot, target.margin)
+        values = measures(envelope_loads(tried, robot, target), robot, target.margin)
         values = values.reshape(-1, len(rows), _TRIES)[rows % len(values), rows]
         best = Motions(*(part[..., rows * _TRIES + values.argmax(axis=1)] for part in tried))
     return best
@@ -200,13 +186,6 @@ def sized(robot: Robot, requirement: Requirement) -> Robot:
             )
         casters.append(caster.model_copy(update=changed))
     return robot.model_copy(update={"casters": tuple(casters)})
-
-
-def _measures(loads: Loads, robot: Robot, margin: float) -> Array:
-    """Use, torque, speed and power of every motor (4 J, S)."""
-    uses = np.nan_to_num(motor_uses(loads, robot, margin), posinf=0.0)
-    torque = np.maximum(loads.along, loads.against)
-    return np.concatenate([uses, torque, loads.speed, loads.along * loads.speed])
 
 
 def _moved(motions: Motions, step: float, rng: np.random.Generator) -> Motions:

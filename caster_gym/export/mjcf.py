@@ -5,10 +5,12 @@ its solver softens over a few time steps. So it slips a little, and less with ev
 rolling without slip, the equations of caster_gym.
 
 The platform slides in x, y and z and turns about the vertical: it cannot tip, the slide in z lets its weight press the
-wheels on the floor. Rotor inertias, damping and dry friction sit at the joints, as in the robot's file. MuJoCo's dry
-friction holds a joint that caster_gym lets creep: a comment in the model says how fast. A motor that turns one joint
-alone acts on that joint; a motor that the gear of its caster couples to both joints acts on a tendon whose length is
-what the motor has turned. docs/export.md tells which of this other readers of MJCF take.
+wheels on the floor; with `tips` it moves freely, its mass centre at its height, and can tip. Armature, damping and dry
+friction sit at the joints, as in the robot's file. MuJoCo's dry friction holds a joint that caster_gym lets creep: a
+comment in the model says how fast. A motor that turns one joint alone acts on that joint, and its rotor is part of the
+joint's armature; a motor that the gear of its caster couples to both joints acts on a tendon whose length is what the
+motor has turned, and whose armature is its rotor, driven or not. docs/export.md tells which of this other readers of
+MJCF take.
 """
 
 import math
@@ -16,21 +18,24 @@ from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 from caster_gym.mechanics.parameters import GRAVITY
-from caster_gym.robot import Caster, Footprint, Motor, Robot
+from caster_gym.robot import Caster, Footprint, Robot
 
 FRICTION = 5.0  # [-] more than any floor has, so that no wheel breaks away
 FRICTION_STIFFNESS = 100.0  # [-] of friction over that of the normal force: less creep under load
 CONTACT_STEPS = 2.0  # time constant of the contact in time steps, the stiffest that MuJoCo accepts
 DRAWN_HEIGHT = 0.05  # [m] of the platform, which has none in the robot's file
 _KINDS = ("roll", "steer")  # of the joints and motors of a caster
+_AXES = ("1 0 0", "0 1 0", "0 0 1")
+_TURNS = (("yaw", "0 0 1"), ("pitch", "0 1 0"), ("tilt", "1 0 0"))
 _SEEN = 'contype="0" conaffinity="0" mass="0"'  # drawn only
 
 
-def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
+def mjcf(robot: Robot, time_step: float, friction: float = FRICTION, tips: bool = False) -> str:
     """The robot as MJCF, with one motor for each joint of `robot.driven`, in that order.
 
     Motors take torques [N m] within their greatest; that these fall with speed is left to who drives them. time_step in
-    s; friction between wheels and floor. Raises ValueError for masses and inertias that no solid body can have.
+    s; friction between wheels and floor; tips: the platform is free, so that loads shift between the wheels as it
+    accelerates. Raises ValueError for masses and inertias that no solid body can have.
     """
     if not 0.0 < time_step < math.inf:
         raise ValueError(f"time_step must be positive and finite, got {time_step:g} s")
@@ -57,11 +62,8 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
     <light pos="0 0 3"/>
     <geom name="floor" type="plane" size="0 0 1" contype="1" conaffinity="2" rgba="0.95 0.95 0.96 1"/>
     <body name="platform">
-      <joint name="x" type="slide" axis="1 0 0"/>
-      <joint name="y" type="slide" axis="0 1 0"/>
-      <joint name="z" type="slide" axis="0 0 1"/>
-      <joint name="yaw" type="hinge" axis="0 0 1"/>
-      {_inertial(p.mass, (*p.com, 0.0), (p.inertia, p.inertia, p.inertia))}
+      {_platform_joints(tips)}
+      {_inertial(p.mass, (*p.com, p.height if tips else 0.0), (p.inertia, p.inertia, p.inertia))}
       {outline}{casters}
     </body>
   </worldbody>{
@@ -74,6 +76,13 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION) -> str:
   </actuator>
 </mujoco>
 """
+
+
+def _platform_joints(tips: bool) -> str:
+    """How the platform moves: x, y, z and yaw, and with `tips` about its own y-axis and x-axis, in that order."""
+    slides = [f'<joint name="{name}" type="slide" axis="{axis}"/>' for name, axis in zip("xyz", _AXES, strict=True)]
+    hinges = [f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in _TURNS[: 3 if tips else 1]]
+    return "\n      ".join([*slides, *hinges])
 
 
 def _what_belongs_together(time_step: float, friction: float) -> str:
@@ -123,11 +132,11 @@ def _caster_body(number: int, caster: Caster) -> str:
     width = _numbers(caster.radius, 0.2 * caster.radius)
     return f"""
       <body name="link_{number}" pos="{_numbers(caster.x, caster.y, caster.radius)}">
-        {_hinge(f"steer_{number}", "0 0 1", caster.steer)}
+        {_hinge(f"steer_{number}", "0 0 1", caster, 1)}
         {_inertial(link.mass, (-behind, left, 0.0), (link.inertia, link.inertia, link.inertia))}
         <geom type="capsule" fromto="0 0 0 {centre}" size="{_numbers(0.15 * caster.radius)}" {_SEEN}/>
         <body name="wheel_{number}" pos="{centre}">
-          {_hinge(f"roll_{number}", "0 1 0", caster.roll)}
+          {_hinge(f"roll_{number}", "0 1 0", caster, 0)}
           {_inertial(wheel.mass, (0.0, 0.0, 0.0), (wheel.yaw_inertia, wheel.spin_inertia, wheel.yaw_inertia))}
           <geom type="sphere" size="{_numbers(caster.radius)}" contype="2" conaffinity="1" group="3"/>
           <geom type="cylinder" size="{width}" euler="1.5707963267948966 0 0" rgba="0.15 0.17 0.2 1" {_SEEN}/>
@@ -135,9 +144,18 @@ def _caster_body(number: int, caster: Caster) -> str:
       </body>"""
 
 
-def _hinge(name: str, axis: str, motor: Motor) -> str:
+def _hinge(name: str, axis: str, caster: Caster, joint: int) -> str:
+    """The rolling joint, 0, or the steering joint, 1, with the rotors of motors that turn it alone."""
+    motors = (caster.roll, caster.steer)
+    motor = motors[joint]
+    alone = (
+        one.rotor * ratios[joint] ** 2
+        for one, ratios in zip(motors, caster.gear, strict=True)
+        if ratios[joint] and not ratios[1 - joint]
+    )
+    armature = _numbers(motor.armature + sum(alone))
     friction = f'damping="{_numbers(motor.viscous)}" frictionloss="{_numbers(motor.coulomb)}"'
-    return f'<joint name="{name}" type="hinge" axis="{axis}" armature="{_numbers(motor.armature)}" {friction}/>'
+    return f'<joint name="{name}" type="hinge" axis="{axis}" armature="{armature}" {friction}/>'
 
 
 def _inertial(mass: float, position: Sequence[float], diagonal: Sequence[float]) -> str:
@@ -145,13 +163,17 @@ def _inertial(mass: float, position: Sequence[float], diagonal: Sequence[float])
 
 
 def _tendons(number: int, caster: Caster, driven: Sequence[str]) -> str:
-    """What each motor of both joints has turned; with scrub also the wheel's yaw over ground, platform and steering."""
-    turned = "".join(
-        f'\n    <fixed name="motor_{kind}_{number}"><joint joint="roll_{number}" coef="{_numbers(roll)}"/>'
-        f'<joint joint="steer_{number}" coef="{_numbers(steer)}"/></fixed>'
-        for kind, (roll, steer) in zip(_KINDS, caster.gear, strict=True)
-        if roll and steer and f"{kind}_{number}" in driven
-    )
+    """What each motor of both joints has turned, if it is driven or has a rotor; with scrub also the wheel's yaw over
+    ground, that of platform and steering."""
+    turned = ""
+    for kind, motor, (roll, steer) in zip(_KINDS, (caster.roll, caster.steer), caster.gear, strict=True):
+        if roll and steer and (motor.rotor or f"{kind}_{number}" in driven):
+            rotor = f' armature="{_numbers(motor.rotor)}"' if motor.rotor else ""
+            turned += (
+                f'\n    <fixed name="motor_{kind}_{number}"{rotor}>'
+                f'<joint joint="roll_{number}" coef="{_numbers(roll)}"/>'
+                f'<joint joint="steer_{number}" coef="{_numbers(steer)}"/></fixed>'
+            )
     if not caster.scrub:
         return turned
     joints = f'<joint joint="yaw" coef="1"/><joint joint="steer_{number}" coef="1"/>'

@@ -1,9 +1,9 @@
 """What would make a path one that can be driven: found by trying, so that the advice holds."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Protocol, Self
 
-from caster_gym.paths.feasibility import motor_use
+from caster_gym.paths.feasibility import SURE, greatest_use
 from caster_gym.paths.trajectory import LEAST_STEPS, Trajectory
 from caster_gym.robot import Robot
 
@@ -46,7 +46,6 @@ def timed_remedy(path: Adaptable, robot: Robot, time_step: float) -> str | None:
 
 def _drivable(path: Adaptable, robot: Robot, time_step: float) -> bool:
     try:
-        trajectories: Sequence[Trajectory] = path.trajectories(time_step)
+        return greatest_use(path, time_step, robot) <= SURE
     except ValueError:
         return False
-    return bool((motor_use(trajectories, robot).use <= 1.0).all())

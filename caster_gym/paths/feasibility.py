@@ -8,7 +8,6 @@ The robot rolls without slip, its casters trail, and its motors share the work w
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Protocol, Self
 
 import numpy as np
@@ -21,16 +20,29 @@ from caster_gym.mechanics.linear import dot, solve
 from caster_gym.mechanics.motors import motor_ranges, motor_speeds
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, total
-from caster_gym.paths.trailing import trailing_directions
-from caster_gym.paths.trajectory import Array, Plane, Trajectory
+from caster_gym.paths.moments import (
+    Block,
+    Moments,
+    Motion,
+    Spans,
+    hard_spans,
+    joined,
+    moments_within,
+    motion_at,
+    sampled,
+)
+from caster_gym.paths.trajectory import COLUMNS, LEAST_STEPS, Array, Trajectory
 from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
 LACKING = 0.05  # [-] of that push: a force that the motors leave undone counts as a use of 1 from here on
 _SLOW, _FALLS = 64.0, 0.9  # [-] factor of ease, from which on the use of motors must fall so much as it doubles
 _SLOWEST = 256.0  # [-] that is tried: below, dry friction fades, so that robots which are stuck would seem to creep
+SURE = 0.999  # [-] use of what is said to do: it does at any time step, whatever that makes of the path
+_SHORT = 0.02  # [s] longer steps do not show all of a path
+_MANY = 20_000  # of them show any path well enough
+_WHOLE = 1e-6  # [-] of a time step
 _PRECISION = 1.02  # [-] of the factor that is found
-_BLOCK = 8192  # samples that are worked on at once, so that their arrays stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -57,20 +69,71 @@ class Easable(Protocol):
 
 
 def motor_use(trajectories: Sequence[Trajectory], robot: Robot) -> MotorUse:
-    """The hardest moment of each trajectory for the robot's driven motors.
+    """The hardest moment of each trajectory for the robot's driven motors, at its samples or between them.
 
     Of all torques that give the wrench of the inverse dynamics, those with the least sum of squares count, each as a
     share of its motor's greatest torque.
     """
-    parts: list[tuple[Array, ...]] = []
-    for (steps, time_step), group in groupby(trajectories, key=lambda t: (len(t.samples) - 1, t.time_step)):
-        samples = np.stack([trajectory.samples for trajectory in group])
-        psi = trailing_directions(samples, robot)
-        rows = max(1, _BLOCK // (steps + 1))
-        blocks = [slice(i, i + rows) for i in range(0, len(samples), rows)]
-        parts.extend(_hardest(samples[b], psi[b], time_step, robot_parameters(robot)) for b in blocks)
-    use, joint, time, torque, left, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return MotorUse(use, joint.astype(np.int64), time, torque, left, speed)
+    numbers = robot_parameters(robot)
+
+    hardest = _Hardest(len(trajectories), robot.caster_count)
+    spans: list[Spans] = []
+    for block in sampled(trajectories, robot):
+        found = motor_uses_at(block.motion, numbers)
+        hardest.note_samples(block, found)
+        spans.append(hard_spans(block, found, hardest.use, robot))
+    for moments in moments_within(
+        joined(spans), hardest.use.copy(), lambda motion: motor_uses_at(motion, numbers), robot
+    ):
+        hardest.note(moments)
+    return hardest.told(numbers)
+
+
+def motor_uses_at(motion: Motion, robot: RobotParameters) -> Array:
+    """Uses (2 N + 1, ...) of all motors in a motion, and of the force that the driven ones lack."""
+    return _motors(motion, robot)[0]
+
+
+class _Hardest:
+    """The hardest moment that is known of each of P trajectories."""
+
+    def __init__(self, count: int, casters: int) -> None:
+        self.use = np.zeros(count)
+        self._joint = np.zeros(count, dtype=np.int64)
+        self._time = np.zeros(count)
+        self._rows = np.zeros((count, len(COLUMNS)))
+        self._psi = np.zeros((count, casters), dtype=np.complex128)
+
+    def note_samples(self, block: Block, uses: Array) -> None:
+        """Uses (J, P, K + 1) at all samples of some trajectories."""
+        count, points = block.rows.shape[:2]
+        joint, moment = np.divmod(uses.swapaxes(0, 1).reshape(count, -1).argmax(axis=1), points)
+        every = np.arange(count)
+        self._keep(block.path, uses[joint, every, moment], joint, moment * block.time_step)
+        self._rows[block.path], self._psi[block.path] = block.rows[every, moment], block.psi[every, moment]
+
+    def note(self, moments: Moments) -> None:
+        """Moments between samples."""
+        joint = moments.values.argmax(axis=0)
+        use = moments.values[joint, np.arange(len(joint))]
+        rising = np.argsort(use, kind="stable")
+        last = np.zeros(len(self.use), dtype=np.int64)
+        last[moments.path[rising]] = rising  # the greatest comes last
+        here = np.unique(moments.path)
+        i = last[here]
+        more = use[i] > self.use[here]
+        here, i = here[more], i[more]
+        self._keep(here, use[i], joint[i], moments.time[i])
+        self._rows[here], self._psi[here] = moments.rows[i], moments.psi[i]
+
+    def _keep(self, path: NDArray[np.int64], use: Array, joint: NDArray[np.int64], time: Array) -> None:
+        self.use[path], self._joint[path], self._time[path] = use, joint, time
+
+    def told(self, robot: RobotParameters) -> MotorUse:
+        """What the motors do at these moments."""
+        _, *states = _motors(motion_at(self._rows, self._psi), robot)
+        torque, left, speed = (state[self._joint, np.arange(len(self.use))] for state in states)
+        return MotorUse(self.use, self._joint, self._time, torque, left, speed)
 
 
 def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Robot) -> None:
@@ -78,12 +141,28 @@ def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Rob
 
     Raises ValueError with the path, joint, time and torques, and gentler limits that were tried and found to do.
     """
-    hardest = motor_use(trajectories, robot)
+    driven = [*trajectories, *_as_written(path, trajectories[0].time_step)]
+    hardest = motor_use(driven, robot)
     k = int(hardest.use.argmax())
     if hardest.use[k] <= 1.0:
         return
-    remedy = _remedy(path, trajectories[k].time_step, robot)
-    raise ValueError(f"path {trajectories[k].name!r} {_complaint(hardest, k, robot)}; {remedy}")
+    remedy = _remedy(path, trajectories[0].time_step, robot)
+    raise ValueError(f"path {driven[k].name!r} {_complaint(hardest, k, robot)}; {remedy}")
+
+
+def greatest_use(path: Easable, time_step: float, robot: Robot) -> float:
+    """The greatest use of any motor on a path, as it is driven at a time step [s] and as it is written."""
+    driven = [*path.trajectories(time_step), *_as_written(path, time_step)]
+    return float(motor_use(driven, robot).use.max())
+
+
+def _as_written(path: Easable, time_step: float) -> tuple[Trajectory, ...]:
+    """A path in exactly its duration, at short steps; none where that is what a time step [s] makes of it."""
+    steps = path.duration / time_step
+    if abs(steps - round(steps)) < _WHOLE and (time_step <= _SHORT or steps >= _MANY):
+        return ()
+    short = min(max(np.ceil(path.duration / _SHORT), LEAST_STEPS), _MANY)
+    return path.trajectories(path.duration / max(np.ceil(steps), short))
 
 
 def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
@@ -102,45 +181,37 @@ def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
 def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
     """What going slower does: by little more than the path must, if it may last as long as that."""
 
-    def use(factor: float, whole: bool = False) -> float:
+    steps = max(np.ceil(path.duration / time_step), LEAST_STEPS)
+
+    def use(factor: float) -> float:
         slower = path.eased(factor)
-        step = time_step if whole else time_step * slower.duration / path.duration  # as many samples are quicker
-        return float(motor_use(slower.trajectories(step), robot).use.max())
+        return float(motor_use(slower.trajectories(slower.duration / steps), robot).use.max())  # as many are quicker
 
     high, asked = 1.0, np.inf
-    while asked > 1.0:
+    while asked > SURE:
         high, before = 2.0 * high, asked
         asked = use(high)
-        if asked > 1.0 and (high >= _SLOWEST or (high >= _SLOW and asked > _FALLS * before)):
+        if asked > SURE and (high >= _SLOWEST or (high >= _SLOW and asked > _FALLS * before)):
             return f"going slower does not help, not even {high:g} times"
     low = max(1.0, 0.5 * high)
     while high > _PRECISION * low:
         middle = (low * high) ** 0.5
-        low, high = (low, middle) if use(middle) <= 1.0 else (middle, high)
+        low, high = (low, middle) if use(middle) <= SURE else (middle, high)
     try:
-        while use(high, whole=True) > 1.0:  # more samples may see a little more
+        while greatest_use(path.eased(high), time_step, robot) > SURE:  # the duration is one of whole steps
             high *= _PRECISION
     except ValueError:
         return f"it must be driven {high:.3g} times as slowly, which takes more time steps than a path may have"
     return f"{path.eased(high).remedy} would do"
 
 
-def _hardest(samples: Array, psi: Plane, time_step: float, robot: RobotParameters) -> tuple[Array, ...]:
-    """Use, joint, time, torque, torque left and speed (P,) at the hardest moment of samples (P, K + 1, 10)."""
-    back = samples[..., 2] - 1j * samples[..., 3]
-    velocity, acceleration = (back * (samples[..., i] + 1j * samples[..., i + 1]) for i in (4, 7))
-    omega, alpha = samples[..., 6].copy(), samples[..., 9].copy()
-    turning = acceleration - 1j * omega * velocity  # derivative of the components of the velocity in B
-    v = (velocity.real.copy(), velocity.imag.copy(), omega)
-    v_rate = (turning.real.copy(), turning.imag.copy(), alpha)
-    directions = tuple((f.real.copy(), f.imag.copy()) for f in np.moveaxis(psi * back[..., None], -1, 0))
-    force = inverse_dynamics(v, directions, v_rate, robot)
-    effort, lack = least_effort(force, directions, robot)
-    states = flatten(each(_motor_states, (v, effort), directions, robot.casters))
+def _motors(motion: Motion, robot: RobotParameters) -> tuple[Array, Array, Array, Array]:
+    """Use, torque, torque left and speed (J, ...) of all motors, and of the force that they lack."""
+    force = inverse_dynamics(motion.v, motion.directions, motion.rate, robot)
+    effort, lack = least_effort(force, motion.directions, robot)
+    states = flatten(each(_motor_states, (motion.v, effort), motion.directions, robot.casters))
     use, torque, left, speed = (np.stack(column) for column in zip(*states, lack, strict=True))
-    joint, moment = np.divmod(np.moveaxis(use, 0, 1).reshape(len(samples), -1).argmax(axis=1), samples.shape[1])
-    here = joint, np.arange(len(samples)), moment
-    return use[here], joint, moment * time_step, torque[here], left[here], speed[here]
+    return use, torque, left, speed
 
 
 def least_effort(

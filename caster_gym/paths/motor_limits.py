@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
-from caster_gym.mechanics.dynamics import bias, caster_drive, inertia, inverse_dynamics, joint_friction, resistance
+from caster_gym.mechanics.dynamics import bias, caster_drive, inertia, inverse_dynamics, resistance
 from caster_gym.mechanics.linear import dot, multiply
 from caster_gym.mechanics.motors import motor_speeds, torque_range
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, add, each, flatten
 from caster_gym.paths.arc_length import Line, between
 from caster_gym.paths.feasibility import least_effort
+from caster_gym.paths.moments import FRICTION_TURN, dry_friction, greatest_torques
 from caster_gym.paths.trailing import directions_at_rows
 from caster_gym.paths.trajectory import Array, Plane
 from caster_gym.robot import Robot
@@ -35,7 +36,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 PARTS = 4  # of an interval, at whose ends half-planes stand
 _STEP = 1.0 / 24.0  # [-] of the shortest trail between the points of `excess`: a flip errs by 0.1 % of a torque then
 _SWIFT = 0.03  # [rad] of steering between two of PARTS points, from which on `excess` looks closer
-_TURN = 2e-3  # [-] of a motor's torque: dry friction that changes by more between two points may have any value between
+_SAME = 1e-9  # [-] friction that differs by no more than rounding: the first place is told
 LEAST_LEFT = 0.01  # [-] of the margin that dry friction must leave
 
 
@@ -231,11 +232,11 @@ def _friction_between(
 
     Joints may change one after the other: each counts with the worst of its friction at the point and its neighbours.
     """
-    dry = flatten(each(_dry_friction, (v, robot.platform.coulomb_speed), directions, robot.casters))
-    sizes = flatten(each(_sizes, (), robot.casters))
+    dry = flatten(each(dry_friction, (v, robot.platform.coulomb_speed), directions, robot.casters))
+    sizes = flatten(each(greatest_torques, (), robot.casters))
     jumping = np.zeros(v[2].shape, dtype=np.bool_)
     for torque, size in zip(dry, sizes, strict=True):
-        jumps = np.abs(np.diff(torque, axis=0)) > _TURN * size
+        jumps = np.abs(np.diff(torque, axis=0)) > FRICTION_TURN * size
         jumping[1:] |= jumps
         jumping[:-1] |= jumps
     here = np.nonzero(jumping)
@@ -251,19 +252,6 @@ def _friction_between(
             more[2 * motor] += np.maximum(share * least, share * most)
             more[2 * motor + 1] += np.maximum(-share * least, -share * most)
     return here, more
-
-
-def _dry_friction(v: Vector, coulomb_speed: float, f: Direction, caster: CasterParameters) -> tuple[Array, Array]:
-    """Dry friction of a caster's two joints. [N m]"""
-    roll, steer = joint_rates(v, f, caster)
-    return (
-        joint_friction(roll, 0.0, caster.roll_coulomb, coulomb_speed),
-        joint_friction(steer, 0.0, caster.steer_coulomb, coulomb_speed),
-    )
-
-
-def _sizes(caster: CasterParameters) -> tuple[float, float]:
-    return caster.roll_max_torque, caster.steer_max_torque
 
 
 def _motion(points: Array, psi: Plane) -> _Motion:
@@ -300,7 +288,7 @@ def _shares(force: Vector, directions: tuple[Direction, ...], robot: RobotParame
 def _refuse_stiction(left: Array, lines: Sequence[Line], robot: Robot, margin: float) -> None:
     """Refuse lines (F, C, P) along which dry friction leaves nothing of the motors' torque."""
     c, k = divmod(int(left.min(axis=0).argmin()), left.shape[2])
-    f = int(left[:, c, k].argmin())
+    f = int((left[:, c, k] <= left[:, c, k].min() + _SAME).argmax())
     if left[f, c, k] > LEAST_LEFT * margin:
         return
     line, joint, share = lines[k], c // 2, margin - left[f, c, k]

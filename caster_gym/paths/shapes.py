@@ -15,7 +15,7 @@ from caster_gym.paths.trajectory import (
     Plane,
     Trajectory,
     place,
-    rest_to_rest,
+    rest_to_rest_at,
     rounded_down,
     rounded_up,
     tabulate,
@@ -52,12 +52,12 @@ class Shape(Frozen):
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]:
         """The one timed trajectory of this path. Time step in s."""
         steps = whole_steps(self.duration, time_step)
-        table = self._walked(self.curve, self.turn, self.laps, steps, time_step)
+        table = self._walked(self.curve, self.turn, self.laps, np.arange(steps + 1) / steps, steps * time_step)
         return (Trajectory(self.shape, time_step, table, self.description),)
 
-    def _walked(self, curve: Curve, turn: Turn, laps: int, steps: int, time_step: float) -> Array:
-        """Samples (steps + 1, 10) of a curve and its headings, walked from rest to rest. Time step in s."""
-        share, rate, acceleration = rest_to_rest(steps, time_step)
+    def _walked(self, curve: Curve, turn: Turn, laps: int, tau: Array, duration: float) -> Array:
+        """Samples (T, 10) of a curve and its headings, walked from rest to rest, at shares 0 … 1 of a duration [s]."""
+        share, rate, acceleration = rest_to_rest_at(tau, duration)
         p, first, second, third = (slope * laps**n for n, slope in enumerate(curve(share * laps)))
         angle, turned, bend = turn(share, (p, first, second, third))
         motion = (p, first * rate, second * rate**2 + first * acceleration)

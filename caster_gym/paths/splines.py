@@ -18,6 +18,7 @@ from caster_gym.paths.waypoints import SAME_PLACE, Track, Turns, read_track
 Waypoint = tuple[float, float] | tuple[float, float, float]
 
 _LEAST_SIZE = 10.0  # [-] a path through waypoints is at least so many tolerances long or wide
+_LEAST_LEG = 0.2  # [s] of each leg from rest to rest, where the duration leaves so much
 _TURN_WAY = 0.3  # [m/rad] a turn on the spot takes as long as this way
 
 
@@ -116,23 +117,25 @@ class Spline(Shape):
         walks = self._walks
         if len(walks) == 1:
             return super().trajectories(time_step)
-        whole = whole_steps(self.duration, time_step)
-        # time by the root of the way: then all legs need about the same greatest acceleration
-        efforts = np.sqrt([walk.way + _TURN_WAY * walk.turning for walk in walks])
-        spare = whole - LEAST_STEPS * len(walks)
-        if spare < 0:
+        steps = whole_steps(self.duration, time_step)
+        least = LEAST_STEPS * time_step
+        if least * len(walks) > steps * time_step * (1.0 + 1e-9):
             raise ValueError(
                 f"a duration of {self.duration:g} s is too short for {len(walks)} legs from rest to rest, each of "
                 f"which needs at least {LEAST_STEPS} time steps of {time_step:g} s"
             )
-        ends = np.rint(spare * np.cumsum(efforts) / efforts.sum()).astype(int)
-        steps = LEAST_STEPS + np.diff(ends, prepend=0)
+        # time by the root of the way: then all legs need about the same greatest acceleration
+        efforts = np.sqrt([walk.way + _TURN_WAY * walk.turning for walk in walks])
+        least = max(min(_LEAST_LEG, steps * time_step / len(walks)), least)
+        times = least + (steps * time_step - least * len(walks)) * efforts / efforts.sum()
+        ends = np.cumsum(times)
+        moments = np.arange(steps + 1) * time_step
+        legs = np.searchsorted(ends[:-1], moments, side="right")
+        share = np.clip((moments - (ends - times)[legs]) / times[legs], 0.0, 1.0)
         tables = [
-            self._walked(walk.curve, walk.turn, 1, int(count), time_step)
-            for walk, count in zip(walks, steps, strict=True)
+            self._walked(walk.curve, walk.turn, 1, share[legs == k], float(times[k])) for k, walk in enumerate(walks)
         ]
-        rows = np.concatenate([tables[0][:1], *(table[1:] for table in tables)])
-        return (Trajectory(self.shape, time_step, rows, self.description),)
+        return (Trajectory(self.shape, time_step, np.concatenate(tables), self.description),)
 
     def curve(self, u: Array) -> Slopes:
         return self._walks[0].curve(u)

@@ -9,6 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain, read_angles, unwrapped
+from caster_gym.paths.in_between import in_between, room_for
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import (
     LEAST_STEPS,
@@ -229,15 +230,16 @@ def _apart(points: Array, least: float) -> list[int]:
 def _hermite(at: Array, values: Array, rates: Array, times: Array) -> Array:
     """Quintics between poses with given velocities and accelerations (K, 6): value and two derivatives (3, T, 3)."""
     k = np.clip(np.searchsorted(at, times + 1e-9 * at[-1], side="right") - 1, 0, len(at) - 2)
-    h = (at[k + 1] - at[k])[:, None]
-    u = np.clip((times - at[k])[:, None] / h, 0.0, 1.0)
-    p, v, a = values[k], h * rates[k, :3], h**2 * rates[k, 3:]
-    step, v_end, a_end = values[k + 1] - p, h * rates[k + 1, :3], h**2 * rates[k + 1, 3:]
-    lack, v_lack, a_lack = step - v - 0.5 * a, v_end - v - a, a_end - a
-    c3 = 10.0 * lack - 4.0 * v_lack + 0.5 * a_lack
-    c4 = -15.0 * lack + 7.0 * v_lack - a_lack
-    c5 = 6.0 * lack - 3.0 * v_lack + 0.5 * a_lack
-    value = p + u * (v + u * (0.5 * a + u * (c3 + u * (c4 + u * c5))))
-    first = (v + u * (a + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h
-    second = (a + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / h**2
-    return np.stack([value, first, second])
+    h, share = at[k + 1] - at[k], np.clip((times - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0)
+    start, end = ((values[i], rates[i, :3], rates[i, 3:]) for i in (k, k + 1))
+    return np.stack(in_between(start, end, h[:, None], share[:, None], _room(at, rates[:, 3:])[k]))
+
+
+def _room(at: Array, acceleration: Array) -> Array:
+    """What accelerations (K, M) may do between poses (K - 1, M), beside going straight from one to the next."""
+    h = np.diff(at)[:, None]
+    if len(h) < 2:
+        return np.full_like(acceleration[1:], np.inf)
+    bent = 2.0 * np.diff(np.diff(acceleration, axis=0) / h, axis=0) / (h[1:] + h[:-1])
+    first, last = np.concatenate([bent[:1], bent]), np.concatenate([bent, bent[-1:]])
+    return room_for(h**2 * first, h**2 * last)

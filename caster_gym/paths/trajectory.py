@@ -96,7 +96,11 @@ def rest_to_rest(steps: int, time_step: float) -> tuple[Array, Array, Array]:
 
     Rate and acceleration are zero at both ends.
     """
-    tau, duration = np.arange(steps + 1) / steps, steps * time_step
+    return rest_to_rest_at(np.arange(steps + 1) / steps, steps * time_step)
+
+
+def rest_to_rest_at(tau: Array, duration: float) -> tuple[Array, Array, Array]:
+    """The same at shares 0 … 1 of a duration [s]."""
     progress = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
     rate = 30.0 * tau**2 * (1.0 - tau) ** 2 / duration
     acceleration = 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau) / duration**2

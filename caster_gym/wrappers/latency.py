@@ -30,7 +30,10 @@ class ActionDelay(Feature):
 
 
 class MotorLag(Feature):
-    """Actions are followed as by a first-order lag: what remains to be done falls as exp(−t / time constant)."""
+    """Actions are followed as by a first-order lag: what remains to be done falls as exp(−t / time constant).
+
+    Over each control period the mean of what follows is held, so that a motor's impulse is the right one.
+    """
 
     kind: Literal["motor_lag"] = "motor_lag"
     time_constant: Size = 0.02  # [s] by episode
@@ -63,18 +66,26 @@ class _Delay(Runtime):
 
 
 class _Lag(Runtime):
+    """With x = period / time constant, a share exp(−x) of what remains is left after a period, (1 − exp(−x)) / x of it
+    in the mean over the period."""
+
     def __init__(self, feature: MotorLag, place: Place) -> None:
         self._range = feature.time_constant
         self._place = place
-        self._share = np.ones((place.count, 1))  # of what remains, done in a control period
-        self._followed = np.zeros((place.count, place.width))
+        self._left = np.zeros((place.count, 1))
+        self._mean_left = np.zeros((place.count, 1))
+        self._followed = np.zeros((place.count, place.width))  # at the end of the period before
 
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
         self._followed[robots] = 0.0
         constants: Array = between(self._range, uniforms(self._place.seeds[robots], FIRST))
         with np.errstate(divide="ignore"):
-            self._share[robots] = 1.0 - np.exp(-self._place.period / constants)
+            x = self._place.period / constants
+        self._left[robots] = np.exp(-x)
+        self._mean_left[robots] = -np.expm1(-x) / x
 
     def act(self, actions: Actions) -> Actions:
-        self._followed += self._share * (actions - self._followed)
-        return self._followed.astype(np.float32)
+        remaining = self._followed - actions
+        held: Actions = (actions + self._mean_left * remaining).astype(np.float32)
+        self._followed = actions + self._left * remaining
+        return held

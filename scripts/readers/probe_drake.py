@@ -68,9 +68,10 @@ facts = {
     if abs(roll.effort_limit() - LIMIT) < 1e-12
     else f"{roll.effort_limit():g}",
     "motors of two joints": f"{dropped(said_of_coupled, 'will be ignored')}; {len(names)} of 8 are left",
-    "rotor inertia": f"{rotor:.4g} kg m² of {ARMATURE:g}; without its motor dropped, without a word"
+    "armature of joints": f"{rotor:.4g} kg m² of {ARMATURE:g}; without its motor dropped, without a word"
     if inertia_dropped_with_motor
     else f"{rotor:.4g}",
+    "rotors of two joints (armature of a tendon)": dropped(said_of_coupled, "tag 'tendon'"),
     "damping of joints": f"taken, {joint.default_damping_vector()[0]:g} of {VISCOUS:g} N m s",
     "dry friction of joints": dropped(said, "frictionloss"),
     "scrub (damping of a tendon)": dropped(said, "tag 'tendon'"),

@@ -32,8 +32,27 @@ def drive(file, wide):
     return float(motor), float(passive), float(speed / np.abs(data.qvel).max())
 
 
+def mass_differs(file):
+    """By how much the mass matrix differs from MuJoCo's, over what tendon armature adds to that."""
+    model = mujoco.MjModel.from_xml_path(file)
+    bare = mujoco.MjModel.from_xml_path(file)
+    bare.tendon_armature[:] = 0.0
+    matrices = []
+    for one in (model, bare):
+        data = mujoco.MjData(one)
+        mujoco.mj_forward(one, data)
+        whole = np.zeros((one.nv, one.nv))
+        mujoco.mj_fullM(one, data, whole)
+        matrices.append(whole)
+    there = mjx.put_model(model)
+    ours = np.asarray(mjx.full_m(there, mjx.forward(there, mjx.make_data(there))))
+    return float(np.abs(ours - matrices[0]).max() / np.abs(matrices[1] - matrices[0]).max())
+
+
 single, coupled = (drive(file, False) for file in sys.argv[1:3])
 exact = drive(sys.argv[2], True)
+lost = mass_differs(sys.argv[2])
+rotors = "taken" if lost < 1e-2 else f"differs by {lost:.0%}"
 taken = "taken" if max(single[:2]) < 1e-6 else f"differs by {max(single[:2]):.1g}"
 tendons = "taken" if max(coupled[:2]) < 1e-6 else f"differs by {max(coupled[:2]):.1g}"
 print(
@@ -44,7 +63,8 @@ print(
             "their gear": taken,
             "their limits": "taken",
             "motors of two joints": tendons,
-            "rotor inertia": "taken",
+            "armature of joints": "taken",
+            "rotors of two joints (armature of a tendon)": rotors,
             "damping of joints": taken,
             "dry friction of joints": "taken",
             "scrub (damping of a tendon)": taken,

@@ -31,6 +31,8 @@ with contextlib.redirect_stdout(sys.stderr):
         (getattr(single, name) for name in ("joint_damping", "joint_target_kd") if number(getattr(single, name)) > 0.0),
         None,
     )
+    held = getattr(coupled.mujoco, "tendon_armature", None)
+    armature = 0.0 if held is None else float(held.numpy().max())
     facts = {
         "masses and inertias": f"taken, {single.body_mass.numpy().sum():.4g} kg",
         "motors of one joint": f"taken as attributes of its MuJoCo solver, {len(limits)} of 6",
@@ -38,7 +40,10 @@ with contextlib.redirect_stdout(sys.stderr):
         "their limits": f"as these, {limits[0].tolist()[-1]:.4g} N m; "
         f"joint_effort_limit {number(single.joint_effort_limit):g}",
         "motors of two joints": f"as these, {sum(kind != kinds[1] for kind in kinds)} of 4",
-        "rotor inertia": f"taken, {number(single.joint_armature):g} kg m²",
+        "armature of joints": f"taken, {number(single.joint_armature):g} kg m²",
+        "rotors of two joints (armature of a tendon)": f"as motors, {armature:.4g} kg m²"
+        if armature > 0.0
+        else "dropped, without a word",
         "damping of joints": "dropped" if damping is None else f"taken, {number(damping):g} N m s",
         "dry friction of joints": f"taken, {number(single.joint_friction):g} N m",
         "scrub (damping of a tendon)": f"as motors, {max(tendon_damping):g} N m s",

@@ -30,6 +30,8 @@ def friction(field, value):
     return f"taken: {word}" if felt(field) else f"{word}, but `aba` ignores it"
 
 
+at_joint = float(coupled.armature[coupled.joints[coupled.getJointId("roll_1")].idx_v])
+armature = f"{'taken' if felt('armature') else 'ignored'}, {model.armature[roll]:g} of {ARMATURE:g}"
 limit = float(model.upperEffortLimit[roll])
 geometry = pin.buildGeomFromMJCF(coupled, sys.argv[2], pin.GeometryType.VISUAL)
 collision = pin.buildGeomFromMJCF(model, sys.argv[1], pin.GeometryType.COLLISION)
@@ -41,7 +43,8 @@ print(
             "their gear": "dropped with the motors",
             "their limits": f"dropped, without a word: {limit:g} N m",
             "motors of two joints": "none: torques are given at the joints",
-            "rotor inertia": f"{'taken' if felt('armature') else 'ignored'}, {model.armature[roll]:g} of {ARMATURE:g}",
+            "armature of joints": armature,
+            "rotors of two joints (armature of a tendon)": f"dropped, without a word: {at_joint:g} kg m² at the joint",
             "damping of joints": friction("damping", VISCOUS),
             "dry friction of joints": f"loaded, {model.upperDryFrictionLimit[roll]:g} of {COULOMB:g}, "
             "but `aba` ignores it",
