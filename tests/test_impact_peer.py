@@ -40,7 +40,8 @@ def test_on_a_floor_that_cannot_hold_it_the_robot_is_nearly_free():
     found = [compare(robot, draw) for draw in range(6)]
     for one in found:
         assert one.traction > 10.0
-        assert one.loose_impulse < one.peer_impulse < 1.4 * one.loose_impulse
+        # the floor gives a share of what it has within the contact: up to 17 N s in the direction of the wall
+        assert one.loose_impulse < one.peer_impulse < one.loose_impulse + 20.0
         assert one.impulse > 1.3 * one.loose_impulse
     ours, theirs = (np.median([getattr(one, name) for one in found]) for name in ("sideways", "peer_sideways"))
     assert ours > 5.0 * theirs

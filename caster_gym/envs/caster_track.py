@@ -73,8 +73,8 @@ class CasterTrackEnv(CasterEnv):
     | robot | impact_traction | impulse here | MuJoCo's, whose wheels slip | sideways here | MuJoCo's |
     |---|---|---|---|---|---|
     | chung2008 | 1.0 | 4.7 N s | 4.7 N s | 0.05 m/s | 0.05 m/s |
-    | xr4000 | 8.4 | 68 N s | 54 N s | 0.05 m/s | 0.01 m/s |
-    | tidybot2 | 36 | 120 N s | 48 N s | 0.15 m/s | 0.02 m/s |
+    | xr4000 | 8.0 | 67 N s | 53 N s | 0.06 m/s | 0.02 m/s |
+    | tidybot2 | 36 | 120 N s | 50 N s | 0.18 m/s | 0.03 m/s |
 
     **Endings** `terminated`: the robot left its corridor (0.5 m from the reference), its state stopped being finite,
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:
