@@ -24,6 +24,8 @@ from caster_gym.mechanics import (
     contact_impulses,
     dynamics,
     first_contact,
+    floor_friction,
+    free_casters,
     ground,
     impulse,
     integration,
@@ -32,6 +34,7 @@ from caster_gym.mechanics import (
     plant,
     scalars,
     separation,
+    slip,
 )
 
 __all__ = ["INLINE", "borrowed", "compiled", "teach"]
@@ -111,5 +114,5 @@ def _sqrt(x: Any) -> Any:
 
 for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
     teach(_module)
-for _module in (separation, first_contact, contact_impulses, contact):
+for _module in (separation, first_contact, contact_impulses, contact, free_casters, floor_friction, slip):
     teach(_module)

@@ -14,7 +14,7 @@ from caster_gym.mechanics.contact_impulses import hold, press
 from caster_gym.mechanics.dynamics import forward_dynamics, inertia
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
 from caster_gym.mechanics.ground import FloorUse, floor_use, impact_traction
-from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, unit, unpack_state
+from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, state_where, unit
 from caster_gym.mechanics.motors import caster_power
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, add, anywhere, each, maximum, minimum, total, where
@@ -65,7 +65,7 @@ def lift(state: State, hull: Hull, obstacles: Obstacles, first: Any, end: Any) -
             sunk = sunk | deep
         if not anywhere(sunk):
             break
-    return State((x, y), (c, s), state.twist, state.directions), nearest
+    return State((x, y), (c, s), state.twist, state.directions, state.rates, state.tilt), nearest
 
 
 def power_of(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
@@ -118,7 +118,7 @@ def land(
     at = (state.position[0] + c * px - s * py, state.position[1] + s * px + c * py)
     acted = lands & (hits.normal > 0.0)
     struck = lands & (hits.impacts > 0.0)
-    return State(state.position, state.heading, twist, state.directions), Touch(
+    return State(state.position, state.heading, twist, state.directions, state.rates, state.tilt), Touch(
         (touch.impulse[0] + where(acted, jx, 0.0 * jx), touch.impulse[1] + where(acted, jy, 0.0 * jy)),
         touch.pressing + where(acted, hits.normal, 0.0 * jx),
         (where(struck, at[0], touch.point[0]), where(struck, at[1], touch.point[1])),
@@ -177,7 +177,7 @@ def guarded_step(
             touch.work + 0.5 * share * (power_of(lifted, torques, robot) + power_of(target, torques, robot)),
             touch.impact_traction,
         )
-        state = unpack_state(each(where, (walks,), pack_state(target), pack_state(state)))
+        state = state_where(walks, target, state)
         if anywhere(lands):
             bounce = obstacles.restitution + nothing if i < LIVELY else nothing
             state, touch = land(state, lands, bounce, touch, robot, hull, obstacles, first, end)
