@@ -24,6 +24,7 @@ from caster_gym.mechanics import (
     contact_impulses,
     dynamics,
     first_contact,
+    floor,
     floor_friction,
     free_casters,
     ground,
@@ -114,5 +115,5 @@ def _sqrt(x: Any) -> Any:
 
 for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
     teach(_module)
-for _module in (separation, first_contact, contact_impulses, contact, free_casters, floor_friction, slip):
+for _module in (separation, first_contact, contact_impulses, contact, free_casters, floor_friction, floor, slip):
     teach(_module)

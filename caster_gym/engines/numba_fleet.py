@@ -39,15 +39,83 @@ from caster_gym.robot import Robot
 
 
 @register_jitable(**INLINE)
-def torque_row(casters: Any) -> int:
-    """First row of the joint torques."""
-    return BODY_ROWS + 2 * len(casters)
+def torque_row(casters: Any, floor: Any) -> int:
+    """First row of the joint torques, behind the state."""
+    if floor is None:
+        return BODY_ROWS + 2 * len(casters)
+    return BODY_ROWS + 4 * len(casters) + 2
 
 
 @register_jitable(**INLINE)
-def room_row(casters: Any) -> int:
-    """Row of the room; negative while the coming step is to be taken with care. Parameters follow."""
-    return torque_row(casters) + 2 * len(casters)
+def room_row(casters: Any, floor: Any) -> int:
+    """Row of the room; negative while the coming step is to be taken with care."""
+    return torque_row(casters, floor) + 2 * len(casters)
+
+
+@register_jitable(**INLINE)
+def friction_row(casters: Any, floor: Any) -> int:
+    """First row of the floor's friction under each wheel, if wheels may slip. Parameters follow."""
+    return room_row(casters, floor) + 1
+
+
+@register_jitable(**INLINE)
+def parameter_row(casters: Any, floor: Any) -> int:
+    """First row of the robot's parameters."""
+    if floor is None:
+        return friction_row(casters, floor)
+    return friction_row(casters, floor) + len(casters)
+
+
+@register_jitable(**INLINE)
+def _state_of(block: Any, lane: Any, casters: Any, floor: Any) -> Any:
+    """State of one robot."""
+    if floor is None:
+        return read_state(block, lane, 0, casters)
+    return read_slip_state(block, lane, 0, casters)
+
+
+@register_jitable(**INLINE)
+def _target(state: Any, torques: Any, h: Any, robot: Any, frictions: Any, floor: Any) -> Any:
+    """The state after one step in the open."""
+    if floor is None:
+        return rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)
+    end, _ = slip_step(state, torques, (0.0, 0.0, 0.0), h, frictions, robot)
+    return end
+
+
+@register_jitable(**INLINE)
+def _frictions(block: Any, lane: Any, casters: Any, floor: Any) -> Any:
+    """Friction under each wheel of one robot."""
+    if floor is None:
+        return None
+    return read(block, lane, friction_row(casters, floor), counting(casters))
+
+
+@register_jitable(**INLINE)
+def _find_frictions(block: Any, lanes: Any, casters: Any, floor: Any) -> None:
+    """Find the friction under the wheels of all robots."""
+    if floor is None:
+        return
+    _look_at_patches(block, lanes, casters, floor, floor.patches)
+
+
+@register_jitable(**INLINE)
+def _look_at_patches(block: Any, lanes: Any, casters: Any, floor: Any, patches: Any) -> None:
+    """Where there are patches; else every wheel keeps its friction."""
+    if patches is None:
+        return
+    row, parameters = friction_row(casters, floor), parameter_row(casters, floor)
+    for lane in range(lanes):
+        robot = read_robot(block, lane, parameters, casters)
+        write(block, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
+    for k in range(len(patches)):
+        patch = (patches[k, 0], patches[k, 1], patches[k, 2], patches[k, 3])
+        for lane in range(lanes):  # neighbours side by side, a patch at a time
+            state = read_slip_state(block, lane, 0, casters)
+            robot = read_robot(block, lane, parameters, casters)
+            before = read(block, lane, row, counting(casters))
+            shared = state.position, state.heading, patch
+            write(block, lane, row, each(patch_friction, shared, before, state.directions, robot.casters))
 
 
 @register_jitable(**INLINE)
@@ -75,16 +143,17 @@ def _take_care(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, caster
 
 @register_jitable(**INLINE)
 def _step_lanes(
-    block: Any, lanes: int, here: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...]
+    block: Any, lanes: int, here: int, h: float, hull: Any, obstacles: Any, casters: tuple[int, ...], floor: Any
 ) -> None:
-    """One RK4 step of the first lanes of one block, of which the first `here` hold robots and the rest are spare."""
-    row, reach = room_row(casters), reach_of(hull)
+    """One step of the first lanes of one block, of which the first `here` hold robots and the rest are spare."""
+    row, reach = room_row(casters, floor), reach_of(hull)
     _measure(block, here, h, hull, obstacles, casters)
+    _find_frictions(block, lanes, casters, floor)
     for lane in range(lanes):
-        state = read_state(block, lane, 0, casters)
-        torques = read_pairs(block, lane, torque_row(casters), casters)
-        robot = read_robot(block, lane, row + 1, casters)
-        target = rk4_step(state, torques, (0.0, 0.0, 0.0), h, robot)
+        state = _state_of(block, lane, casters, floor)
+        torques = read_pairs(block, lane, torque_row(casters, floor), casters)
+        robot = read_robot(block, lane, parameter_row(casters, floor), casters)
+        target = _target(state, torques, h, robot, _frictions(block, lane, casters, floor), floor)
         end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, reach)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
