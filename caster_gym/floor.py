@@ -25,7 +25,7 @@ class Floor(Frozen):
     """A floor of finite friction. Without one the floor grips: wheels roll and never slip."""
 
     friction: Annotated[float, Field(gt=0.0, le=GREATEST)] | None = None  # [-] else the robot's own `floor_friction`
-    contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor can hold a wheel by friction · load · time
+    contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
     patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts
 
 

@@ -27,6 +27,7 @@ from caster_gym.mechanics import (
     floor,
     floor_friction,
     free_casters,
+    grip_or_slip,
     ground,
     impulse,
     integration,
@@ -36,6 +37,7 @@ from caster_gym.mechanics import (
     scalars,
     separation,
     slip,
+    slip_impact,
 )
 
 __all__ = ["INLINE", "borrowed", "compiled", "teach"]
@@ -43,6 +45,7 @@ __all__ = ["INLINE", "borrowed", "compiled", "teach"]
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
 _LOOPS_AND_CHOICES |= {
     scalars.flatten,
+    scalars.either,
     scalars.greatest,
     scalars.register,
     scalars.anywhere,
@@ -115,5 +118,16 @@ def _sqrt(x: Any) -> Any:
 
 for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
     teach(_module)
-for _module in (separation, first_contact, contact_impulses, contact, free_casters, floor_friction, floor, slip):
+for _module in (
+    separation,
+    first_contact,
+    contact_impulses,
+    contact,
+    free_casters,
+    floor_friction,
+    floor,
+    slip,
+    slip_impact,
+    grip_or_slip,
+):
     teach(_module)

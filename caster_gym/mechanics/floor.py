@@ -7,9 +7,23 @@ import numpy as np
 from caster_gym.floor import Floor
 from caster_gym.mechanics.caster import wheel_centre
 from caster_gym.mechanics.free_casters import held_inertia
-from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, caster_parameters
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.parameters import (
+    CasterParameters,
+    Dynamics,
+    RobotParameters,
+    caster_parameters,
+    robot_parameters,
+)
 from caster_gym.mechanics.scalars import Direction, Scalar, each, entry, where
 from caster_gym.robot import Robot
+
+
+class Surface(NamedTuple):
+    """The floor under one robot."""
+
+    frictions: tuple[Scalar, ...]  # [-] under each wheel
+    contact_time: Scalar  # [s]
 
 
 class FloorTable(NamedTuple):
@@ -45,6 +59,29 @@ def check_slips(robot: Robot) -> None:
                 f"a floor of finite friction needs casters with inertia of their own, but caster {number} of robot "
                 f"{robot.name!r} has none about its {axis}: give it a 'wheel.{key}', or let the floor grip"
             )
+
+
+def check_floor(robot: Robot, dynamics: Dynamics) -> None:
+    """Refuse what a floor of finite friction has no equations for."""
+    if dynamics != "exact":
+        raise ValueError(f'a floor of finite friction needs dynamics="exact", got {dynamics!r}')
+    check_slips(robot)
+
+
+def parameters_on(robot: Robot, dynamics: Dynamics, floor: Floor | None) -> RobotParameters:
+    """The numbers of a robot on a floor, or on one that grips. Raises ValueError for robots that cannot slip."""
+    if floor is None:
+        return robot_parameters(robot, dynamics)
+    check_floor(robot, dynamics)
+    return on_floor(robot_parameters(robot), floor)
+
+
+def surface_under(state: State, robot: RobotParameters, floor: FloorTable | None) -> Surface | None:
+    """The floor under a robot; None if it grips."""
+    if floor is None:
+        return None
+    frictions = wheel_frictions(state.position, state.heading, state.directions, floor.patches, robot)
+    return Surface(frictions, floor.contact_time)
 
 
 def own_friction(friction: Scalar, caster: CasterParameters) -> Scalar:

@@ -127,6 +127,12 @@ def slide_of(wheel: Grip) -> Scalar:
     return wheel.slide
 
 
+def used_share(wheel: Grip, limit: Limit) -> Scalar:
+    """Share of the greatest impulse that a wheel takes. [-]"""
+    p, q = wheel.impulse
+    return sqrt(p * p + q * q) * limit.inverse
+
+
 def newton_round(
     change: Vector, caution: Scalar, problem: Problem, slides: tuple[Scalar, ...]
 ) -> tuple[Vector, tuple[Scalar, ...]]:
@@ -140,9 +146,7 @@ def newton_round(
     return add(change, step), each(slide_of, (), grips)
 
 
-def final_impulses(
-    change: Vector, problem: Problem, slides: tuple[Scalar, ...]
-) -> tuple[Vector, tuple[Grip, ...]]:
+def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
     """Impulses within their limits at a change of the twist that was found, and the change that they do make."""
     inertia, force, footings, limits = problem
     grips = each(grip, (change, 0.0), footings, limits, slides)

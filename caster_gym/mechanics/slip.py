@@ -14,9 +14,11 @@ from caster_gym.mechanics.floor_friction import (
     Grip,
     Limit,
     final_impulses,
+    floor_stiffness,
     impulse_limit,
     newton_round,
     sliding,
+    used_share,
 )
 from caster_gym.mechanics.free_casters import (
     Border,
@@ -64,6 +66,8 @@ class Footfall(NamedTuple):
     slips: tuple[Pair, ...]  # [m/s] velocity over the floor along f and f⊥ at the end
     forces: tuple[Pair, ...]  # [N] of the floor along f and f⊥, mean over the step
     loads: tuple[Scalar, ...]  # [N]
+    uses: tuple[Scalar, ...]  # [-] share of the friction that the floor has
+    answer: Symmetric  # what answers to another push at C meanwhile: held wheels with the robot, others alone
 
 
 class Stage(NamedTuple):
@@ -345,4 +349,6 @@ def slip_step(
     tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
     end = with_velocities(end, add(state.twist, change), rates, tilted)
     slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
-    return end, Footfall(slips, each(mean_force, (1.0 / h,), grips), each(pressing, (), loads))
+    answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))
+    forces, uses = each(mean_force, (1.0 / h,), grips), each(used_share, (), grips, limits)
+    return end, Footfall(slips, forces, each(pressing, (), loads), uses, answer)
