@@ -46,6 +46,7 @@ _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, sc
 _LOOPS_AND_CHOICES |= {
     scalars.flatten,
     scalars.either,
+    scalars.apart,
     scalars.greatest,
     scalars.register,
     scalars.anywhere,

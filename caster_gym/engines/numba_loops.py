@@ -77,6 +77,11 @@ def _either(thing: Any, absent: Any, present: Any, arguments: Any) -> Any:
     return lambda thing, absent, present, arguments: present(thing, *arguments)
 
 
+@overload(scalars.apart, strict=False)
+def _apart(function: Any, arguments: Any) -> Any:
+    return lambda function, arguments: function(*arguments)
+
+
 @overload(scalars.each, jit_options=INLINE, strict=False)
 def _each(function: Any, shared: Any, *columns: Any) -> Any:
     count, half = len(columns[0]), len(columns[0]) // 2

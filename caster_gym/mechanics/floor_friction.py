@@ -11,13 +11,14 @@ Newton's method is needed for those three alone, in a fixed number of rounds wit
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.linear import dot, multiply, solve
+from caster_gym.mechanics.linear import dot, factors, multiply, substitute
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
     Symmetric,
     Vector,
     add,
+    clip,
     each,
     maximum,
     sqrt,
@@ -142,12 +143,50 @@ def newton_round(
     pushed = add(force, total(each(floor_wrench, (), footings, grips)))
     held = add(inertia, total(each(floor_stiffness, (), footings, grips)))
     taken = multiply(inertia, change)
-    step = solve(held, (pushed[0] - taken[0], pushed[1] - taken[1], pushed[2] - taken[2]))
+    left = (pushed[0] - taken[0], pushed[1] - taken[1], pushed[2] - taken[2])
+    step = substitute(factors(held), left)
     return add(change, step), each(slide_of, (), grips)
 
 
-def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
+def floor_answer(change: Vector, footing: Footing, wheel: Grip) -> Direction:
+    """How u answers to all impulses: to a wheel's own, and to the change of the twist that all make. [m/s]"""
+    ff, fp, pp = footing.mobility
+    p, q = wheel.impulse
+    return (
+        dot(footing.rows[0], change) + ff * p + fp * q,
+        dot(footing.rows[1], change) + fp * p + pp * q,
+    )
+
+
+def work_parts(wheel: Grip, before: Direction, answer: Direction) -> tuple[Scalar, Scalar]:
+    """P · u without the impulses, and P · what they change it by. [J]"""
+    p, q = wheel.impulse
+    return p * before[0] + q * before[1], p * answer[0] + q * answer[1]
+
+
+def lessened(share: Scalar, wheel: Grip) -> Grip:
+    """A wheel with a share of its impulse."""
+    return Grip((share * wheel.impulse[0], share * wheel.impulse[1]), wheel.slide, wheel.stiffness)
+
+
+def cut_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
     """Impulses within their limits at a change of the twist that was found, and the change that they do make."""
     inertia, force, footings, limits = problem
     grips = each(grip, (change, 0.0), footings, limits, slides)
-    return solve(inertia, add(force, total(each(floor_wrench, (), footings, grips)))), grips
+    given = add(force, total(each(floor_wrench, (), footings, grips)))
+    return substitute(factors(inertia), given), grips
+
+
+def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
+    """The same; should the rounds not have sufficed, impulses are lessened until they add no energy."""
+    inertia, force, footings, limits = problem
+    grips = each(grip, (change, 0.0), footings, limits, slides)
+    found = factors(inertia)
+    alone = substitute(found, force)
+    by_floor = substitute(found, total(each(floor_wrench, (), footings, grips)))
+    before = each(unheld_velocity, (alone,), footings)
+    gained, resisted = total(each(work_parts, (), grips, before, each(floor_answer, (by_floor,), footings, grips)))
+    nothing = 0.0 * resisted
+    share = clip(-gained / maximum(resisted, TINY + nothing), nothing, 1.0 + nothing)  # (S13)
+    step = (share * by_floor[0], share * by_floor[1], share * by_floor[2])
+    return add(alone, step), each(lessened, (share,), grips)

@@ -14,7 +14,7 @@ from caster_gym.mechanics.ground import FloorUse, floor_use, impact_traction, li
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.motors import joint_power
 from caster_gym.mechanics.parameters import RobotParameters
-from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, each, either, greatest, total
+from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, apart, each, either, greatest, total
 from caster_gym.mechanics.separation import Hull, Obstacles
 from caster_gym.mechanics.slip import Footfall, slip_step, with_velocities
 from caster_gym.mechanics.slip_impact import answered_impact, held_answer, impact_footing
@@ -26,7 +26,8 @@ def free_step(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
 ) -> State:
     """One step of h seconds in the open."""
-    return either(surface, rk4_step, slipping_step, (state, torques, wrench, h, robot))
+    end: State = either(surface, rk4_step, slipping_step, (state, torques, wrench, h, robot))
+    return end
 
 
 def slipping_step(
@@ -41,7 +42,18 @@ def noted_step(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
 ) -> tuple[State, FloorUse]:
     """The same, and what the floor was asked."""
-    return either(surface, noted_rolling_step, noted_slipping_step, (state, torques, wrench, h, robot))
+    given = state, torques, wrench, h, robot
+    found: tuple[State, FloorUse] = either(surface, noted_rolling_step, noted_slipping_step, given)
+    return found
+
+
+def careful_step(
+    state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
+) -> tuple[State, FloorUse]:
+    """The same as part of a step among obstacles, which is compiled for one robot at a time."""
+    given = state, torques, wrench, h, robot
+    found: tuple[State, FloorUse] = either(surface, noted_rolling_step, careful_slipping_step, given)
+    return found
 
 
 def noted_rolling_step(
@@ -60,6 +72,14 @@ def noted_slipping_step(
     return end, use_of(footfall)
 
 
+def careful_slipping_step(
+    surface: Surface, state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
+) -> tuple[State, FloorUse]:
+    """What it gave."""
+    end, footfall = apart(slip_step, (state, torques, wrench, h, surface.frictions, robot))
+    return end, use_of(footfall)
+
+
 def use_of(footfall: Footfall) -> FloorUse:
     """Greatest share of the floor's friction that a wheel used, and how many wheels it did not carry."""
     (lifted,) = total(each(lifts, (), footfall.loads))
@@ -70,7 +90,10 @@ def response(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
 ) -> tuple[Vector, Symmetric]:
     """Twist that a robot would reach in h seconds, and what answers to a push meanwhile."""
-    return either(surface, rolling_response, slipping_response, (state, torques, wrench, h, robot))
+    found: tuple[Vector, Symmetric] = either(
+        surface, rolling_response, slipping_response, (state, torques, wrench, h, robot)
+    )
+    return found
 
 
 def rolling_response(
@@ -86,13 +109,14 @@ def slipping_response(
     surface: Surface, state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[Vector, Symmetric]:
     """Wheels that the floor holds answer with the robot, others alone."""
-    end, footfall = slip_step(state, torques, wrench, h, surface.frictions, robot)
+    end, footfall = apart(slip_step, (state, torques, wrench, h, surface.frictions, robot))
     return end.twist, footfall.answer
 
 
 def all_joint_rates(state: State, robot: RobotParameters, surface: Any) -> tuple[Pair, ...]:
     """Rolling and steering rate of each caster. [rad/s]"""
-    return either(surface, rolling_joint_rates, slipping_joint_rates, (state, robot))
+    found: tuple[Pair, ...] = either(surface, rolling_joint_rates, slipping_joint_rates, (state, robot))
+    return found
 
 
 def rolling_joint_rates(state: State, robot: RobotParameters) -> tuple[Pair, ...]:
@@ -128,7 +152,8 @@ def impact(
 ) -> tuple[State, Pressure, Scalar]:
     """State after impulses at all contacts, these, and the greatest share of the floor's friction that a wheel used."""
     given = state, restitution, robot, hull, obstacles, first, end
-    return either(surface, rolling_impact, slipping_impact, given)
+    found: tuple[State, Pressure, Scalar] = either(surface, rolling_impact, slipping_impact, given)
+    return found
 
 
 def rolling_impact(

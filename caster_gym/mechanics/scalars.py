@@ -130,6 +130,11 @@ def either(thing: Any, absent: Callable[..., Any], present: Callable[..., Any], 
     return absent(*arguments) if thing is None else present(thing, *arguments)
 
 
+def apart(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """function(*arguments), for long functions that are called in several places: compiled once, and not inlined."""
+    return function(*arguments)
+
+
 def add(a: tuple[Any, ...], b: tuple[Any, ...]) -> tuple[Any, ...]:
     """Element by element a + b."""
     return tuple(x + y for x, y in zip(a, b, strict=True))

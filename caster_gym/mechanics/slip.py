@@ -13,6 +13,7 @@ from caster_gym.mechanics.floor_friction import (
     Footing,
     Grip,
     Limit,
+    cut_impulses,
     final_impulses,
     floor_stiffness,
     impulse_limit,
@@ -326,7 +327,7 @@ def slip_step(
     problem = part.inertia, part.force, part.footings, limits
     change, slides = newton_round(change, 0.5, problem, slides)
     change, slides = newton_round(change, 0.0, problem, slides)
-    change, grips = final_impulses(change, problem, slides)
+    change, grips = cut_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
     tilted = tilt_after(change, rates, state, state, part, wrench, robot)
 
