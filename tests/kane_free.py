@@ -79,7 +79,7 @@ class FreeKane(Kane):
         floor: np.ndarray,
         wrench: np.ndarray,
     ) -> np.ndarray:
-        """Height times force (2,) along x and y of B: rate of change of the spin about the point on the floor below C."""
+        """Height times force (2,) along x and y of B: change of the spin about the point on the floor below C."""
         q = self._coordinates(steering)
         move = self._rates_of(q, twist, rates)
         fixed = torch.cat((q[:2], torch.zeros(1)))

@@ -81,7 +81,7 @@ def test_slip_energy_and_answer_are_those_of_all_bodies(seed, caster_count):
 @pytest.mark.parametrize("caster_count", CASTER_COUNTS)
 def test_an_impulse_on_the_platform_leaves_the_momenta_of_the_casters(caster_count):
     """(S4): energy of the change is half the impulse times it, which no other change of the rates would give."""
-    robot, numbers, f, _, twist, *_ = draw(5, caster_count)
+    _, numbers, f, *_ = draw(5, caster_count)
     impulse = np.array([1.0, -2.0, 0.4])
     change = tuple(np.linalg.solve(matrix(slip_inertia(f, numbers)), impulse))
     still = ((0.0, 0.0),) * caster_count

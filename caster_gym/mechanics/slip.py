@@ -329,9 +329,8 @@ def slip_step(
     change, slides = newton_round(change, 0.0, problem, slides)
     change, grips = cut_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
-    tilted = tilt_after(change, rates, state, state, part, wrench, robot)
-
-    middle = with_velocities(there, add(state.twist, change), rates, tilted)
+    middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
+    tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
     end = moved(h, state, middle)
     known = turning_lag(grips, 2.0, middle.directions, end.directions, robot)
     part = stage(h, state, middle, end.directions, known, torques, wrench, robot)
