@@ -1,0 +1,86 @@
+"""A floor that wheels slip on, against MuJoCo's elliptic cone."""
+
+import numpy as np
+import pytest
+
+from caster_gym import load_robot
+from scripts.slip_peer import (
+    OUR_STEPS,
+    STEPS,
+    Comparison,
+    Rate,
+    draw_courses,
+    measure,
+    off,
+    on_three,
+    ours,
+    page,
+    peer,
+    scenarios,
+    write_table,
+)
+
+FINE = 1.25e-4  # [s] MuJoCo's
+
+
+def scene_of(robot, name):
+    return next(one for one in scenarios(load_robot(robot), 0) if one.name == name)
+
+
+@pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        ("onset of slip", 0.06),  # creep reaches 20 mm/s some ms before the limit does
+        ("spin-up of a wheel", 0.05),  # loads build up in 5 ms of 150
+        ("regrip", 0.06),  # the last mm/s of a contact that is a spring and a damper
+        ("braking", 0.06),  # loads that swing while the robot pitches
+    ],
+)
+def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance):
+    scene = scene_of(robot, name)
+    mine, theirs = ours(scene, 1e-3), peer(scene, FINE)
+    assert measure(scene, mine) == pytest.approx(measure(scene, theirs), rel=tolerance)
+    assert mine.slip.max() > 0.2
+
+
+@pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
+def test_drifts_end_where_mujocos_do(robot):
+    """A way of some dm, on which wheels slide at up to 2 m/s: MuJoCo's contacts hop then."""
+    scene = scene_of(robot, "drift")
+    mine, theirs = ours(scene, 1e-3), peer(scene, FINE)
+    way = float(np.hypot(*np.diff(mine.pose[:, :2], axis=0).T).sum())
+    assert way > 0.02
+    assert off(theirs, mine) < 0.15 * way
+    assert np.sort(mine.slip.max(axis=0))[-2] > 0.3  # two wheels of three
+
+
+@pytest.mark.parametrize("name", ["onset of slip", "drift", "spin-up of a wheel", "regrip", "braking"])
+def test_a_step_of_the_tasks_is_nearer_to_the_limit_than_mujoco_at_a_finer_one(name):
+    """Ours at 5 ms, MuJoCo at 1 ms, from ours at 0.25 ms."""
+    for robot in ("xr4000", "tidybot2"):
+        scene = scene_of(robot, name)
+        exact = ours(scene, OUR_STEPS[-1])
+        assert off(ours(scene, OUR_STEPS[0]), exact) < 0.5 * off(peer(scene, STEPS[1]), exact)
+
+
+def test_three_casters_stand_around_the_mass_centre():
+    robot = on_three(load_robot("xr4000"))
+    assert np.abs(np.sum([(c.x, c.y) for c in robot.casters], axis=0)).max() < 1e-12
+    assert robot.caster_count == 3
+
+
+def test_page_tells_what_was_compared(tmp_path):
+    """Smoke of page, table and figure."""
+    scenes = [one._replace(duration=0.02) for one in scenarios(load_robot("chung2008"), 0)]
+    compared = []
+    for scene in scenes:
+        mine, theirs = ours(scene, 1e-3), peer(scene, 1e-3)
+        compared.append(Comparison(scene, mine, theirs, np.array([1e-5, 1e-6, 1e-7]), np.full(len(STEPS), 1e-3)))
+    write_table(tmp_path / "slip.csv", compared)
+    draw_courses(tmp_path / "slip.png", compared)
+    lines = (tmp_path / "slip.csv").read_text().splitlines()
+    assert len(lines) == 1 + len(scenes) * (len(OUR_STEPS) + len(STEPS))
+    text = page(compared, [Rate("chung2008", 3e4, 3e3, np.full(len(STEPS), 100.0))], "python -m scripts.slip_peer")
+    assert "| onset of slip | first slip above 20 mm/s [ms] | chung2008 |" in text
+    assert "300 (batch), 30 (one)" in text
