@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-TAG = re.compile(r"\(([KDIGMCOA]\d+)\)")
+TAG = re.compile(r"\(([KDIGMCOSA]\d+)\)")
 
 
 def tags(*paths):

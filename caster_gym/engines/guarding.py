@@ -10,8 +10,9 @@ from typing import Any
 from numba.extending import register_jitable
 
 from caster_gym.engines.numba_compiler import INLINE, borrowed
+from caster_gym.mechanics.floor import FloorTable
 from caster_gym.mechanics.integration import pack_state
-from caster_gym.mechanics.scalars import Scalar, Vector, absolute, each, where
+from caster_gym.mechanics.scalars import Scalar, Vector, absolute, each, either, where
 from caster_gym.mechanics.separation import Hull, Obstacles
 
 CLOSE = 1e-4  # [m] room that a step must leave
@@ -59,6 +60,23 @@ def borrowed_hull(hull: Any) -> Any:
     if hull is None:
         return None
     return Hull(borrowed(hull.faces), borrowed(hull.corners), hull.radius, hull.reach)
+
+
+@register_jitable(**INLINE)
+def borrowed_floor(floor: Any) -> Any:
+    """The floor, if it is one of finite friction, with its arrays borrowed."""
+    return either(floor, _nothing, _borrowed_floor, ())
+
+
+@register_jitable(**INLINE)
+def _nothing() -> None:
+    """None."""
+    return
+
+
+@register_jitable(**INLINE)
+def _borrowed_floor(floor: Any) -> FloorTable:
+    return FloorTable(floor.contact_time, either(floor.patches, _nothing, borrowed, ()))
 
 
 @register_jitable(**INLINE)

@@ -130,7 +130,17 @@ def read_pairs(block: Any, lane: Any, row: Any, casters: Any) -> Any:
 def read_state(block: Any, lane: Any, row: Any, casters: Any) -> State:
     """State of one robot; `casters` is any tuple with an item for each."""
     x, y, c, s, vx, vy, omega = read(block, lane, row, _BODY)
-    return State((x, y), (c, s), (vx, vy, omega), read_pairs(block, lane, row + BODY_ROWS, casters))
+    return State((x, y), (c, s), (vx, vy, omega), read_pairs(block, lane, row + BODY_ROWS, casters), (), ())
+
+
+@register_jitable(**INLINE)
+def read_slip_state(block: Any, lane: Any, row: Any, casters: Any) -> State:
+    """State of one robot whose wheels may slip."""
+    count = len(casters)
+    body = read_state(block, lane, row, casters)
+    rates = read_pairs(block, lane, row + BODY_ROWS + 2 * count, casters)
+    tilt = read(block, lane, row + BODY_ROWS + 4 * count, (0.0, 0.0))
+    return State(body.position, body.heading, body.twist, body.directions, rates, tilt)
 
 
 @register_jitable(**INLINE)

@@ -24,6 +24,10 @@ from caster_gym.mechanics import (
     contact_impulses,
     dynamics,
     first_contact,
+    floor,
+    floor_friction,
+    free_casters,
+    grip_or_slip,
     ground,
     impulse,
     integration,
@@ -32,6 +36,8 @@ from caster_gym.mechanics import (
     plant,
     scalars,
     separation,
+    slip,
+    slip_impact,
 )
 
 __all__ = ["INLINE", "borrowed", "compiled", "teach"]
@@ -39,6 +45,8 @@ __all__ = ["INLINE", "borrowed", "compiled", "teach"]
 _LOOPS_AND_CHOICES = {scalars.where, scalars.sqrt, scalars.each, scalars.add, scalars.total, scalars.pairs}
 _LOOPS_AND_CHOICES |= {
     scalars.flatten,
+    scalars.either,
+    scalars.apart,
     scalars.greatest,
     scalars.register,
     scalars.anywhere,
@@ -111,5 +119,16 @@ def _sqrt(x: Any) -> Any:
 
 for _module in (scalars, linear, caster, dynamics, integration, motors, plant, ground, impulse, actuation):
     teach(_module)
-for _module in (separation, first_contact, contact_impulses, contact):
+for _module in (
+    separation,
+    first_contact,
+    contact_impulses,
+    contact,
+    free_casters,
+    floor_friction,
+    floor,
+    slip,
+    slip_impact,
+    grip_or_slip,
+):
     teach(_module)

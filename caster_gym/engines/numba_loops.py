@@ -6,6 +6,7 @@ tuple is compiled once for itself: writing out makes fewer of them.
 
 from typing import Any
 
+from numba import types
 from numba.extending import overload
 
 from caster_gym.mechanics import scalars
@@ -67,6 +68,18 @@ def _flatten(nested: Any) -> Any:
         lambda nested: nested[0] + nested[1] + nested[2],
         lambda nested: nested[0] + nested[1] + nested[2] + nested[3],
     ][len(nested)]
+
+
+@overload(scalars.either, jit_options=INLINE, strict=False)
+def _either(thing: Any, absent: Any, present: Any, arguments: Any) -> Any:
+    if getattr(thing, "value", thing) in (None, types.none):  # Omitted where it is a default
+        return lambda thing, absent, present, arguments: absent(*arguments)
+    return lambda thing, absent, present, arguments: present(thing, *arguments)
+
+
+@overload(scalars.apart, strict=False)
+def _apart(function: Any, arguments: Any) -> Any:
+    return lambda function, arguments: function(*arguments)
 
 
 @overload(scalars.each, jit_options=INLINE, strict=False)

@@ -8,13 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.engines.time_step import check_rows, check_time_step
+from caster_gym.floor import Floor
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.contact import guarded_step
+from caster_gym.mechanics.floor import FloorTable, check_floor, floor_table, on_floor, surface_under
+from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.impulse import ImpactLaw
-from caster_gym.mechanics.integration import State, rk4_step
+from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
+from caster_gym.mechanics.slip import rolling_state
 from caster_gym.robot import Robot, check_joints
 
 Array = NDArray[np.float64]
@@ -182,12 +186,15 @@ class Model:
         steps: int,
         around: Surroundings | None = None,
         *,
+        floor: Floor | None = None,
         checked: bool = False,
     ) -> Array:
         """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
 
         torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
         around: obstacles, from `caster_gym.arena.packing.surroundings`, off which the robot bounces.
+        floor: one of finite friction, on which wheels may slip. States are then (steps + 1, ..., 6 + 3 N), with η̇ and θ̇
+        of each caster [rad/s] behind the steering; a state (..., 6 + N) starts rolling. Loads start as at rest.
         Angles are continuous in time. Raises ValueError if dt [s] cannot follow the robot, be it of its own numbers or
         of plain ones given in their place; not if the caller has `checked`, or looks for states that are not finite.
         """
@@ -196,20 +203,26 @@ class Model:
         steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
-        x, y, beta, *others = self._components("state", state, 6 + self.robot.caster_count)
-        twist, steering = (others[0], others[1], others[2]), others[3:]
+        n, parameters = self.robot.caster_count, self._on(floor)
+        with_rates = floor is not None and np.shape(state)[-1:] == (6 + 3 * n,)
+        x, y, beta, *others = self._components("state", state, 6 + (3 * n if with_rates else n))
+        twist, steering, rates = (others[0], others[1], others[2]), others[3 : 3 + n], pairs(tuple(others[3 + n :]))
         torques = self._array("torque", torque, 2 * self.robot.caster_count)
         changing = torques.ndim > x.ndim + 1
         if changing and len(torques) != steps:
             raise ValueError(f"torque must hold {steps} steps along its first axis, got {len(torques)}")
         now = State((x, y), self._unit(beta), twist, tuple(self._unit(angle) for angle in steering))
+        if floor is not None:
+            rolling = rolling_state(now, parameters)
+            now = rolling._replace(rates=rates) if with_rates else rolling
+        table = None if floor is None else floor_table(floor)
         angles = [beta, *steering]
-        states = [self._stack((x, y, beta, *twist, *steering))]
+        states = [self._stack((x, y, beta, *twist, *steering, *flatten(now.rates)))]
         for step in range(steps):
             given = self._torques(torques[step] if changing else torques)
-            now = self._step(now, given, dt, around)
+            now = self._step(now, given, dt, around, parameters, table)
             angles = [self._follow(a, f) for a, f in zip(angles, (now.heading, *now.directions), strict=True)]
-            states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:])))
+            states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:], *flatten(now.rates))))
         return self._stack(states, 0)
 
     def _check_time_step(self, dt: float) -> None:
@@ -218,13 +231,29 @@ class Model:
         else:
             check_rows(f"robots like {self.robot.name!r} whose numbers were replaced", self._rows, dt)
 
-    def _step(self, now: State, torques: tuple[tuple[Any, Any], ...], dt: float, around: Surroundings | None) -> State:
+    def _on(self, floor: Floor | None) -> RobotParameters:
+        """The numbers of the robot on a floor."""
+        if floor is None:
+            return self._parameters
+        check_floor(self.robot, self.dynamics)
+        return on_floor(self._parameters, floor)
+
+    @staticmethod
+    def _step(
+        now: State,
+        torques: tuple[tuple[Any, Any], ...],
+        dt: float,
+        around: Surroundings | None,
+        robot: RobotParameters,
+        floor: FloorTable | None,
+    ) -> State:
         """The state after one step of dt seconds."""
+        surface = surface_under(now, robot, floor)
         if around is None or len(around.obstacles.radii) == 0:
-            return rk4_step(now, torques, (0.0, 0.0, 0.0), dt, self._parameters)
+            return free_step(now, torques, (0.0, 0.0, 0.0), dt, robot, surface)
         hull, obstacles = Hull(*map(_listed_table, around.hull)), Obstacles(*map(_listed_table, around.obstacles))
         count = len(obstacles.radii)
-        state, _ = guarded_step(now, torques, (0.0, 0.0, 0.0), dt, self._parameters, hull, obstacles, 0, count)
+        state, _ = guarded_step(now, torques, (0.0, 0.0, 0.0), dt, robot, hull, obstacles, 0, count, surface)
         return state
 
     def _replaced(self, parameters: RobotParameters) -> Array | None:

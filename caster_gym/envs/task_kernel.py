@@ -359,7 +359,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
         turn = (2.0 * uniform(key, episode, np.uint64(3)) - 1.0) * spread[1]
         directions = each(_random_direction, (key, episode), counting(sizes.casters))
-        nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions)
+        nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions, (), ())
         path = world.clocks[1, robot]
         guide_robot(desk, lane, reference_row(sizes), nowhere, 0, path, -1.0, world.guide)
         reference = Reference(*read(desk, lane, reference_row(sizes), _REFERENCE))

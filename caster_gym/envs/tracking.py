@@ -383,4 +383,6 @@ def start(
         (c * turn[0] - s * turn[1], s * turn[0] + c * turn[1]),
         (0.0 * c, 0.0 * c, 0.0 * c),
         directions,
+        (),
+        (),
     )

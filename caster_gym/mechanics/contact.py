@@ -5,17 +5,16 @@ contacts until none approaches. A contact that lasts is a force over the segment
 approaching, so that the robot slides and rests without bouncing. Whatever happens, the number of segments is bounded,
 and the robot only ever moves to where it has been found free: what time is left then is not walked.
 
-This is the robot whose wheels roll without slip, also through impacts: `inertia` is what answers to impulses.
+What a robot does in the open and how it answers to impulses, with wheels that roll or slip, is told by `grip_or_slip`.
 """
 
 from typing import Any, NamedTuple
 
-from caster_gym.mechanics.contact_impulses import hold, press
-from caster_gym.mechanics.dynamics import forward_dynamics, inertia
+from caster_gym.mechanics.contact_impulses import hold
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
-from caster_gym.mechanics.ground import FloorUse, floor_use, impact_traction
-from caster_gym.mechanics.integration import State, difference, pack_state, rk4_step, unit, unpack_state
-from caster_gym.mechanics.motors import caster_power
+from caster_gym.mechanics.grip_or_slip import careful_step, impact, power, response
+from caster_gym.mechanics.ground import FloorUse
+from caster_gym.mechanics.integration import State, difference, pack_state, state_where, unit
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, add, anywhere, each, maximum, minimum, total, where
 from caster_gym.mechanics.separation import TOUCH, Hull, Obstacles, contact_points, separation
@@ -65,13 +64,7 @@ def lift(state: State, hull: Hull, obstacles: Obstacles, first: Any, end: Any) -
             sunk = sunk | deep
         if not anywhere(sunk):
             break
-    return State((x, y), (c, s), state.twist, state.directions), nearest
-
-
-def power_of(state: State, torques: tuple[tuple[Scalar, Scalar], ...], robot: RobotParameters) -> Scalar:
-    """Mechanical power of all motors under torques at the joints. [W]"""
-    (power,) = total(each(caster_power, (state.twist,), state.directions, robot.casters, torques))
-    return power
+    return State((x, y), (c, s), state.twist, state.directions, state.rates, state.tilt), nearest
 
 
 def holding_force(
@@ -84,14 +77,13 @@ def holding_force(
     obstacles: Obstacles,
     first: Any,
     end: Any,
+    surface: Any,
 ) -> tuple[Vector, Scalar]:
     """Wrench in B of lasting contacts that keeps them from approaching over h seconds, and its normal impulse. (O10)"""
-    v = state.twist
-    a = forward_dynamics(v, state.directions, torques, wrench, robot)
-    free = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
-    c, s = state.heading
-    heading = unit((c - s * v[2] * h, s + c * v[2] * h))
-    held, normal = hold(free, state, heading, inertia(state.directions, robot), hull, obstacles, first, end)
+    free, answer = response(state, torques, wrench, h, robot, surface)
+    (c, s), omega = state.heading, state.twist[2]
+    heading = unit((c - s * omega * h, s + c * omega * h))
+    held, normal = hold(free, state, heading, answer, hull, obstacles, first, end)
     rate = 1.0 / maximum(h, 1e-9)
     return (held[0] * rate, held[1] * rate, held[2] * rate), normal
 
@@ -106,19 +98,17 @@ def land(
     obstacles: Obstacles,
     first: Any,
     end: Any,
+    surface: Any,
 ) -> tuple[State, Touch]:
     """State and record after the impulses on those who land."""
-    bounced, hits = press(state, inertia(state.directions, robot), restitution, hull, obstacles, first, end)
-    v = state.twist
-    used = impact_traction((bounced[0] - v[0], bounced[1] - v[1], bounced[2] - v[2]), state.directions, robot)
-    twist = each(where, (lands,), bounced, v)
+    bounced, hits, used = impact(state, restitution, robot, hull, obstacles, first, end, surface)
     c, s = state.heading
     jx, jy = c * hits.wrench[0] - s * hits.wrench[1], s * hits.wrench[0] + c * hits.wrench[1]
     px, py = hits.point
     at = (state.position[0] + c * px - s * py, state.position[1] + s * px + c * py)
     acted = lands & (hits.normal > 0.0)
     struck = lands & (hits.impacts > 0.0)
-    return State(state.position, state.heading, twist, state.directions), Touch(
+    return state_where(lands, bounced, state), Touch(
         (touch.impulse[0] + where(acted, jx, 0.0 * jx), touch.impulse[1] + where(acted, jy, 0.0 * jy)),
         touch.pressing + where(acted, hits.normal, 0.0 * jx),
         (where(struck, at[0], touch.point[0]), where(struck, at[1], touch.point[1])),
@@ -140,8 +130,9 @@ def guarded_step(
     obstacles: Obstacles,
     first: Any,
     end: Any,
+    surface: Any = None,
 ) -> tuple[State, Touch]:
-    """One step of h seconds like `rk4_step`, among the obstacles first … end − 1."""
+    """One step of h seconds like `free_step`, among the obstacles first … end − 1."""
     nothing = 0.0 * (state.twist[0] + h)
     left, trial, landing = h + nothing, h + nothing, nothing
     none = (nothing, nothing, nothing)
@@ -151,8 +142,8 @@ def guarded_step(
         lifted, nearest = lift(state, hull, obstacles, first, end)
         push, pressing = (nothing, nothing, nothing), nothing
         if anywhere(nearest < TOUCH):
-            push, pressing = holding_force(lifted, torques, wrench, trial, robot, hull, obstacles, first, end)
-        target = rk4_step(lifted, torques, add(wrench, push), trial, robot)
+            push, pressing = holding_force(lifted, torques, wrench, trial, robot, hull, obstacles, first, end, surface)
+        target, asks = careful_step(lifted, torques, add(wrench, push), trial, robot, surface)
         (doubt,) = total(each(difference, (), pack_state(target)))
         hit = trial
         if anywhere(landing < 0.5):
@@ -163,7 +154,6 @@ def guarded_step(
         c, s = target.heading
         share = where(walks, trial, nothing)
         impulse = (share * (c * push[0] - s * push[1]), share * (s * push[0] + c * push[1]))
-        asks = floor_use(lifted.twist, lifted.directions, torques, add(wrench, push), robot)
         touch = Touch(
             add(touch.impulse, impulse),
             touch.pressing + where(walks, pressing, nothing),
@@ -174,13 +164,14 @@ def guarded_step(
                 where(walks, maximum(asks.lifted, touch.asks.lifted), touch.asks.lifted),
             ),
             each(where, (walks,), push, touch.held),
-            touch.work + 0.5 * share * (power_of(lifted, torques, robot) + power_of(target, torques, robot)),
+            touch.work
+            + 0.5 * share * (power(lifted, torques, robot, surface) + power(target, torques, robot, surface)),
             touch.impact_traction,
         )
-        state = unpack_state(each(where, (walks,), pack_state(target), pack_state(state)))
+        state = state_where(walks, target, state)
         if anywhere(lands):
             bounce = obstacles.restitution + nothing if i < LIVELY else nothing
-            state, touch = land(state, lands, bounce, touch, robot, hull, obstacles, first, end)
+            state, touch = land(state, lands, bounce, touch, robot, hull, obstacles, first, end, surface)
         left = where(walks, left - trial, left)
         landing = where(short, 1.0 + nothing, nothing)
         trial = where(short, hit, left)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.dynamics import forward_dynamics
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
-from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, flatten, pairs
+from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, flatten, pairs, where
 
 
 class State(NamedTuple):
@@ -15,11 +15,15 @@ class State(NamedTuple):
     heading: Direction  # (cos β, sin β) of the body x-axis, in W
     twist: Vector  # in B
     directions: tuple[Direction, ...]  # rolling direction of each caster, in B
+    # Of a robot whose wheels may slip; else they follow from the twist, and nothing is kept. Section S.
+    rates: tuple[tuple[Scalar, Scalar], ...] = ()  # yaw over ground and roll of each caster [rad/s]
+    tilt: tuple[Scalar, ...] = ()  # [N m] x and y in B, by which inertia shifted the loads on the wheels just before
 
 
 def pack_state(state: State) -> tuple[Scalar, ...]:
-    """(x, y, cos β, sin β, vx, vy, ω, cos δ_1, sin δ_1, …)."""
-    return state.position + state.heading + state.twist + flatten(state.directions)
+    """(x, y, cos β, sin β, vx, vy, ω, cos δ_1, sin δ_1, …), and if wheels may slip η̇_1, θ̇_1, …, the tilt."""
+    body = state.position + state.heading + state.twist
+    return body + flatten(state.directions) + flatten(state.rates) + state.tilt
 
 
 def difference(number: Scalar) -> tuple[Scalar]:
@@ -28,12 +32,24 @@ def difference(number: Scalar) -> tuple[Scalar]:
 
 
 def unpack_state(flat: tuple[Scalar, ...]) -> State:
-    """Inverse of `pack_state`."""
+    """Inverse of `pack_state` for wheels that roll without slip."""
+    return State((flat[0], flat[1]), (flat[2], flat[3]), (flat[4], flat[5], flat[6]), pairs(flat[7:]), (), ())
+
+
+def pair_where(condition: Scalar, yes: Direction, no: Direction) -> Direction:
+    """`where` of two numbers."""
+    return where(condition, yes[0], no[0]), where(condition, yes[1], no[1])
+
+
+def state_where(condition: Scalar, yes: State, no: State) -> State:
+    """The state `yes` where the condition holds, else `no`."""
     return State(
-        (flat[0], flat[1]),
-        (flat[2], flat[3]),
-        (flat[4], flat[5], flat[6]),
-        pairs(flat[7:]),
+        pair_where(condition, yes.position, no.position),
+        pair_where(condition, yes.heading, no.heading),
+        each(where, (condition,), yes.twist, no.twist),
+        each(pair_where, (condition,), yes.directions, no.directions),
+        each(pair_where, (condition,), yes.rates, no.rates),
+        each(where, (condition,), yes.tilt, no.tilt),
     )
 
 
@@ -54,6 +70,8 @@ def derivative(
         (-s * omega, c * omega),
         forward_dynamics(state.twist, state.directions, torques, wrench, robot),
         each(steering_turn, (state.twist,), state.directions, robot.casters),
+        state.rates,
+        state.tilt,
     )
 
 
@@ -70,6 +88,8 @@ def advance(state: State, h: Scalar, rate: State) -> State:
         advance_pair(h, state.heading, rate.heading),
         (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]),
         each(advance_pair, (h,), state.directions, rate.directions),
+        state.rates,
+        state.tilt,
     )
 
 
@@ -89,4 +109,4 @@ def rk4_step(
     k3 = derivative(advance(state, 0.5 * h, k2), torques, wrench, robot)
     k4 = derivative(advance(state, h, k3), torques, wrench, robot)
     end = advance(advance(advance(advance(state, h / 6.0, k1), h / 3.0, k2), h / 3.0, k3), h / 6.0, k4)
-    return State(end.position, unit(end.heading), end.twist, each(unit, (), end.directions))
+    return State(end.position, unit(end.heading), end.twist, each(unit, (), end.directions), end.rates, end.tilt)

@@ -23,6 +23,26 @@ def solve(m: Symmetric, b: Vector) -> Vector:
     return b[0] / xx - l_yx * y - l_zx * z, y, z
 
 
+def factors(m: Symmetric) -> Symmetric:
+    """What `solve` finds of a matrix, for several right sides: l_yx, l_zx, l_zy and the inverses of D."""
+    xx, xy, xz, yy, yz, zz = m
+    x = 1.0 / xx
+    l_yx, l_zx = xy * x, xz * x
+    r_zy = yz - l_yx * xz
+    y = 1.0 / (yy - l_yx * xy)
+    l_zy = r_zy * y
+    return l_yx, l_zx, l_zy, x, y, 1.0 / (zz - l_zx * xz - l_zy * r_zy)
+
+
+def substitute(found: Symmetric, b: Vector) -> Vector:
+    """x of M x = b from the `factors` of M."""
+    l_yx, l_zx, l_zy, x, y, z = found
+    b_y = b[1] - l_yx * b[0]
+    last = (b[2] - l_zx * b[0] - l_zy * b_y) * z
+    middle = b_y * y - l_zy * last
+    return b[0] * x - l_yx * middle - l_zx * last, middle, last
+
+
 def multiply(m: Symmetric, v: Vector) -> Vector:
     """M v."""
     xx, xy, xz, yy, yz, zz = m

@@ -4,9 +4,8 @@ Joint rates turn the motors through `gear`: motor speeds = gear · (θ̇, δ̇).
 go back through its transpose: joint torques = gearᵀ · motor torques. The motors' limits hold at the motors.
 """
 
-from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.parameters import CasterParameters
-from caster_gym.mechanics.scalars import Direction, Scalar, Vector, clip
+from caster_gym.mechanics.scalars import Scalar, clip
 
 
 def motor_speeds(joint_rates: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
@@ -49,7 +48,6 @@ def joint_torques(motor: tuple[Scalar, Scalar], caster: CasterParameters) -> tup
     return caster.gear_rr * roll + caster.gear_sr * steer, caster.gear_rs * roll + caster.gear_ss * steer
 
 
-def caster_power(v: Vector, f: Direction, caster: CasterParameters, torques: tuple[Scalar, Scalar]) -> tuple[Scalar]:
+def joint_power(rates: tuple[Scalar, Scalar], torques: tuple[Scalar, Scalar]) -> tuple[Scalar]:
     """Mechanical power of the torques at a caster's joints, which is that of its motors. [W] (M2)"""
-    theta, delta = joint_rates(v, f, caster)
-    return (torques[0] * theta + torques[1] * delta,)
+    return (torques[0] * rates[0] + torques[1] * rates[1],)

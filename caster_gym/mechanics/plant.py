@@ -2,10 +2,10 @@
 
 from typing import Any, NamedTuple
 
-from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.contact import Touch, guarded_step
-from caster_gym.mechanics.ground import FloorUse, floor_use
-from caster_gym.mechanics.integration import State, rk4_step
+from caster_gym.mechanics.grip_or_slip import all_joint_rates, noted_step
+from caster_gym.mechanics.ground import FloorUse
+from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.motors import joint_torques, motor_speeds, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, each, total
@@ -27,10 +27,9 @@ def motor_power(
     return (0.5 * (torques[0] * (before[0] + after[0]) + torques[1] * (before[1] + after[1])),)
 
 
-def all_motor_speeds(state: State, robot: RobotParameters) -> tuple[tuple[Scalar, Scalar], ...]:
+def all_motor_speeds(state: State, robot: RobotParameters, surface: Any = None) -> tuple[tuple[Scalar, Scalar], ...]:
     """Speeds of each caster's two motors. [rad/s]"""
-    rates = each(joint_rates, (state.twist,), state.directions, robot.casters)
-    return each(motor_speeds, (), rates, robot.casters)
+    return each(motor_speeds, (), all_joint_rates(state, robot, surface), robot.casters)
 
 
 def power_between(
@@ -38,22 +37,30 @@ def power_between(
     torques: tuple[tuple[Scalar, Scalar], ...],
     end: State,
     robot: RobotParameters,
+    surface: Any = None,
 ) -> Scalar:
     """Mean mechanical power of all motors in a step from its torques and the motor speeds at its start. [W]"""
-    (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot)))
+    (power,) = total(each(motor_power, (), torques, before, all_motor_speeds(end, robot, surface)))
     return power
 
 
 def driven_step(
-    state: State, commands: tuple[tuple[Scalar, Scalar], ...], wrench: Vector, h: Scalar, robot: RobotParameters
+    state: State,
+    commands: tuple[tuple[Scalar, Scalar], ...],
+    wrench: Vector,
+    h: Scalar,
+    robot: RobotParameters,
+    surface: Any = None,
 ) -> tuple[State, Drive]:
-    """One RK4 step of h seconds under motor commands in −1 … 1, limited at the speeds of the step's start."""
-    before = all_motor_speeds(state, robot)
+    """One step of h seconds under motor commands in −1 … 1, limited at the speeds of the step's start.
+
+    surface: the floor under the robot, None if it grips.
+    """
+    before = all_motor_speeds(state, robot, surface)
     torques = each(motor_torques, (), commands, before, robot.casters)
     at_joints = each(joint_torques, (), torques, robot.casters)
-    asks = floor_use(state.twist, state.directions, at_joints, wrench, robot)
-    end = rk4_step(state, at_joints, wrench, h, robot)
-    return end, Drive(torques, power_between(before, torques, end, robot), asks)
+    end, asks = noted_step(state, at_joints, wrench, h, robot, surface)
+    return end, Drive(torques, power_between(before, torques, end, robot, surface), asks)
 
 
 def guarded_driven_step(
@@ -66,10 +73,11 @@ def guarded_driven_step(
     obstacles: Obstacles,
     first: Any,
     last: Any,
+    surface: Any = None,
 ) -> tuple[State, Drive, Touch]:
     """The same among the obstacles first … last − 1."""
-    before = all_motor_speeds(state, robot)
+    before = all_motor_speeds(state, robot, surface)
     torques = each(motor_torques, (), commands, before, robot.casters)
     at_joints = each(joint_torques, (), torques, robot.casters)
-    end, touch = guarded_step(state, at_joints, wrench, h, robot, hull, obstacles, first, last)
+    end, touch = guarded_step(state, at_joints, wrench, h, robot, hull, obstacles, first, last, surface)
     return end, Drive(torques, touch.work / h, touch.asks), touch

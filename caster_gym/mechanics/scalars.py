@@ -125,6 +125,16 @@ def each(function: Callable[..., Any], shared: tuple[Any, ...], *columns: tuple[
     return tuple(function(*shared, *items) for items in zip(*columns, strict=True))
 
 
+def either(thing: Any, absent: Callable[..., Any], present: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """absent(*arguments) for a thing that is None, else present(thing, *arguments); known before arithmetic starts."""
+    return absent(*arguments) if thing is None else present(thing, *arguments)
+
+
+def apart(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """function(*arguments), for long functions that are called in several places: compiled once, and not inlined."""
+    return function(*arguments)
+
+
 def add(a: tuple[Any, ...], b: tuple[Any, ...]) -> tuple[Any, ...]:
     """Element by element a + b."""
     return tuple(x + y for x, y in zip(a, b, strict=True))

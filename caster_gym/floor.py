@@ -1,0 +1,40 @@
+"""The floor as it is written in YAML and in Python: one that wheels may slip on. Points are in W."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, PositiveFloat
+
+from caster_gym.configuration import ConfigurationError, Frozen, parse
+
+GREATEST = 1e3  # [-] far above any floor; wheels then roll as if they could not slip
+
+Friction = Annotated[float, Field(ge=0.0, le=GREATEST)]
+
+
+class Patch(Frozen):
+    """A disc of the floor with a friction of its own, such as a patch of ice."""
+
+    friction: Friction  # [-] between it and a wheel whose contact point lies on it
+    x: float  # [m] its centre
+    y: float
+    radius: PositiveFloat  # [m]
+
+
+class Floor(Frozen):
+    """A floor of finite friction. Without one the floor grips: wheels roll and never slip."""
+
+    friction: Annotated[float, Field(gt=0.0, le=GREATEST)] | None = None  # [-] else the robot's own `floor_friction`
+    contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
+    patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts
+
+
+def load_floor(floor: str | Floor | Mapping[str, Any]) -> Floor | None:
+    """A floor of finite friction from the mapping in a YAML file, or None for "grip"."""
+    if isinstance(floor, Floor):
+        return floor
+    if isinstance(floor, Mapping):
+        return parse(Floor, floor, "the floor")
+    if floor == "grip":
+        return None
+    raise ConfigurationError(f"floor must be 'grip' or a mapping such as {{friction: 0.7}}, got {floor!r}")

@@ -1,0 +1,354 @@
+"""Time step of the robot whose wheels may slip. docs/equations.md, section S.
+
+Explicit midpoint for all that is smooth; friction of the floor is found implicitly at the end of each of both stages,
+so that wheels that are held stay at rest at the floor, and slip starts, ends and turns back without chatter.
+"""
+
+from typing import NamedTuple
+
+from caster_gym.mechanics.caster import pivot_velocity, rates
+from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
+from caster_gym.mechanics.floor_friction import (
+    TINY,
+    Footing,
+    Grip,
+    Limit,
+    cut_impulses,
+    final_impulses,
+    floor_stiffness,
+    impulse_limit,
+    newton_round,
+    sliding,
+    used_share,
+)
+from caster_gym.mechanics.free_casters import (
+    Border,
+    OwnInertia,
+    balance,
+    border,
+    edge_inertia,
+    felt_force,
+    floor_mobility,
+    floor_rows,
+    follow,
+    free_response,
+    friction_slopes,
+    implicit_shares,
+    joint_forces,
+    own_inertia,
+    pivot_rows,
+    push_back,
+    slip_velocity,
+    turning_forces,
+)
+from caster_gym.mechanics.ground import platform_tilt, wheel_loads
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.linear import dot
+from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
+from caster_gym.mechanics.scalars import (
+    Direction,
+    Scalar,
+    Symmetric,
+    Vector,
+    add,
+    clip,
+    each,
+    maximum,
+    pairs,
+    total,
+)
+
+Pair = tuple[Scalar, Scalar]
+
+
+class Footfall(NamedTuple):
+    """What the floor did to the wheels in a time step, one number or pair a wheel."""
+
+    slips: tuple[Pair, ...]  # [m/s] velocity over the floor along f and f⊥ at the end
+    forces: tuple[Pair, ...]  # [N] of the floor along f and f⊥, mean over the step
+    loads: tuple[Scalar, ...]  # [N]
+    uses: tuple[Scalar, ...]  # [-] share of the friction that the floor has
+    answer: Symmetric  # what answers to another push at C meanwhile: held wheels with the robot, others alone
+
+
+class Stage(NamedTuple):
+    """All that the friction solve needs of a robot over some time."""
+
+    time: Scalar  # [s]
+    inertia: Symmetric  # of the platform with casters that answer freely
+    force: Vector  # [N s, N s, N m s] known impulse at the platform
+    footings: tuple[Footing, ...]
+    owns: tuple[OwnInertia, ...]
+    edges: tuple[Border, ...]
+    free: tuple[Pair, ...]  # [rad/s] rates at the end while the platform moves on and the floor lets go
+
+
+def unpack_slip_state(flat: tuple[Scalar, ...]) -> State:
+    """Inverse of `pack_state` for wheels that may slip."""
+    half = (len(flat) + 5) // 2
+    return State(
+        (flat[0], flat[1]),
+        (flat[2], flat[3]),
+        (flat[4], flat[5], flat[6]),
+        pairs(flat[7:half]),
+        pairs(flat[half:-2]),
+        (flat[-2], flat[-1]),
+    )
+
+
+def rolling_state(state: State, robot: RobotParameters) -> State:
+    """A state without rates as one of wheels that do not slip yet, with loads as at rest."""
+    nothing = 0.0 * state.twist[0]
+    rates = each(rolling_rates, (state.twist,), state.directions, robot.casters)
+    return State(state.position, state.heading, state.twist, state.directions, rates, (nothing, nothing))
+
+
+def rolling_rates(v: Vector, f: Direction, caster: CasterParameters) -> Pair:
+    """Yaw over ground and roll of a caster that rolls without slip. [rad/s]"""
+    eta, theta, _ = rates(v, f, caster)
+    return eta, theta
+
+
+def turned(f: Direction, angle: Scalar) -> Direction:
+    """A direction turned by an angle, of second order in it, and no longer or shorter than it was."""
+    t = 0.5 * angle
+    scale = 1.0 / (1.0 + t * t)
+    c, s = (1.0 - t * t) * scale, 2.0 * t * scale  # (S9)
+    return c * f[0] - s * f[1], s * f[0] + c * f[1]
+
+
+def steered(h: Scalar, omega: Scalar, f: Direction, rates: Pair) -> Direction:
+    """Rolling direction in B after h seconds."""
+    return turned(f, h * (rates[0] - omega))
+
+
+def lasting_slide(before: Pair, halfway: Pair, free: Pair) -> Pair:
+    """Velocity that an impulse opposes, less what it changes: the mean of a step where a slide lasts, else the end's.
+
+    Twice the mean, which has the same direction. A slide lasts if half a step takes less than a quarter of it. (S14)
+    """
+    x, y = halfway[0] - before[0], halfway[1] - before[1]
+    square = before[0] * before[0] + before[1] * before[1]
+    nothing = 0.0 * square
+    lasts = clip(2.0 - 16.0 * (x * x + y * y) / maximum(square, TINY + nothing), nothing, 1.0 + nothing)
+    return free[0] + lasts * before[0], free[1] + lasts * before[1]
+
+
+def opposing(footings: Footing, against: Pair) -> Footing:
+    """A footing whose impulse opposes another velocity."""
+    return Footing(against, footings.rows, footings.mobility)
+
+
+def free_of(foot: Footing) -> Pair:
+    """u without the floor. [m/s]"""
+    return foot.free
+
+
+def footing(free: Pair, rows: tuple[Vector, Vector], mobility: tuple[Scalar, Scalar, Scalar]) -> Footing:
+    """A footing of its parts."""
+    return Footing(free, rows, mobility)
+
+
+def stage(
+    time: Scalar,
+    start: State,
+    middle: State,
+    ahead: tuple[Direction, ...],
+    known: Vector,
+    torques: tuple[Pair, ...],
+    wrench: Vector,
+    robot: RobotParameters,
+) -> Stage:
+    """A robot over some seconds from `start`, with inertia and forces in `middle` and wheels that end along `ahead`.
+
+    known: impulse at the platform besides. (S8)
+    """
+    slopes = each(friction_slopes, (middle.twist[2], robot.platform.coulomb_speed), middle.rates, robot.casters)
+    owns = each(own_inertia, (), each(implicit_shares, (time,), slopes, robot.casters), robot.casters)
+    edges = each(border, (), middle.directions, owns, robot.casters)
+    given = each(joint_forces, (start.twist[2],), torques, start.rates, slopes)
+    taken = each(turning_forces, (middle.twist,), middle.directions, middle.rates, robot.casters)
+    forces = each(balance, (), given, taken)
+    free = each(free_response, (time,), start.rates, owns, forces)
+    felt, h = total(each(felt_force, (), edges, forces)), platform_bias(middle.twist, robot.platform)
+    footings = each(
+        footing,
+        (),
+        each(slip_velocity, (start.twist,), ahead, free, robot.casters),
+        each(floor_rows, (), ahead, edges, robot.casters),
+        each(floor_mobility, (), owns, robot.casters),
+    )
+    return Stage(
+        time,
+        add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges))),
+        (
+            known[0] + time * (felt[0] + wrench[0] - h[0]),
+            known[1] + time * (felt[1] + wrench[1] - h[1]),
+            known[2] + time * (felt[2] + wrench[2] - h[2]),
+        ),
+        footings,
+        owns,
+        edges,
+        free,
+    )
+
+
+def impulse_of(wheel: Grip) -> Pair:
+    """Impulse of the floor on a wheel along f and f⊥. [N s]"""
+    return wheel.impulse
+
+
+def pushed(free: Pair, answer: Pair) -> Pair:
+    """Rates with the answer to an impulse."""
+    return free[0] + answer[0], free[1] + answer[1]
+
+
+def rates_after(change: Vector, grips: tuple[Grip, ...], part: Stage, robot: RobotParameters) -> tuple[Pair, ...]:
+    """Rates of all casters at the end of a stage that changes the twist."""
+    answers = each(push_back, (), each(impulse_of, (), grips), part.owns, robot.casters)
+    return each(follow, (change,), each(pushed, (), part.free, answers), part.edges)
+
+
+def caster_motion(rate: Scalar, before: Pair, after: Pair, now: Pair) -> tuple[Pair, Pair]:
+    """Rates of a caster now [rad/s], and what they change by in a second [rad/s²]."""
+    return now, (rate * (after[0] - before[0]), rate * (after[1] - before[1]))
+
+
+def free_tilt(
+    v: Vector, v_rate: Vector, f: Direction, motion: tuple[Pair, Pair], caster: CasterParameters
+) -> tuple[Scalar, Scalar]:
+    """Moment, as height times force along x and y of B, by which a caster that may slip tilts the robot. [N m]"""
+    (eta, theta), (eta_rate, theta_rate) = motion
+    along, across = pivot_rows(f, caster)
+    a, b = pivot_velocity(v, f, caster)
+    a_f, a_p = dot(along, v_rate) - v[2] * b, dot(across, v_rate) + v[2] * a
+    d, s, behind, left = caster.trail, caster.offset, caster.link_behind, caster.link_left
+    wheel = a_f - s * eta_rate + d * eta * eta, a_p - d * eta_rate - s * eta * eta
+    link = a_f - left * eta_rate + behind * eta * eta, a_p - behind * eta_rate - left * eta * eta
+    m_w, m_l = caster.radius * caster.wheel_mass, caster.radius * caster.link_mass
+    p = m_w * wheel[0] + m_l * link[0] + caster.spin_inertia * theta_rate  # (S10)
+    q = m_w * wheel[1] + m_l * link[1] + caster.spin_inertia * theta * eta
+    return p * f[0] - q * f[1], p * f[1] + q * f[0]
+
+
+def pressing(load: Scalar) -> Scalar:
+    """A load that is not negative. [N]"""
+    return maximum(load, 0.0 * load)
+
+
+def tilt_after(
+    change: Vector,
+    rates: tuple[Pair, ...],
+    start: State,
+    middle: State,
+    part: Stage,
+    wrench: Vector,
+    robot: RobotParameters,
+) -> Pair:
+    """`ground.tilt` of a robot whose twist and rates change as they do over a stage. [N m]"""
+    rate = 1.0 / part.time
+    v_rate = (rate * change[0], rate * change[1], rate * change[2])
+    motions = each(caster_motion, (rate,), start.rates, rates, middle.rates)
+    casters = total(each(free_tilt, (middle.twist, v_rate), middle.directions, motions, robot.casters))
+    platform = platform_tilt(middle.twist, v_rate, wrench, robot.platform)
+    return platform[0] + casters[0], platform[1] + casters[1]
+
+
+def limit_of(time: Scalar, friction: Scalar, load: Scalar) -> Limit:
+    """Greatest impulse of the floor on a wheel over some seconds."""
+    return impulse_limit(time * friction * load)
+
+
+def slower(before: Limit, after: Limit, slide: Scalar) -> Scalar:
+    """rho of a wheel that slides as fast against another limit."""
+    return slide * before.most * after.inverse
+
+
+def in_body(f: Direction, impulse: Pair) -> Pair:
+    """A vector along f and f⊥, along x and y of B."""
+    return impulse[0] * f[0] - impulse[1] * f[1], impulse[0] * f[1] + impulse[1] * f[0]
+
+
+def lag(was: Pair, shall_be: Pair, caster: CasterParameters) -> Vector:
+    """Wrench at C of the difference of two impulses at a pivot."""
+    x, y = was[0] - shall_be[0], was[1] - shall_be[1]
+    return x, y, caster.x * y - caster.y * x
+
+
+def turning_lag(
+    grips: tuple[Grip, ...],
+    scale: Scalar,
+    middle: tuple[Direction, ...],
+    ahead: tuple[Direction, ...],
+    robot: RobotParameters,
+) -> Vector:
+    """What the floor's impulses along the directions of a step's middle have more than along those of its end. (S9)"""
+    impulses = each(impulse_of, (), grips)
+    was, shall_be = each(in_body, (), middle, impulses), each(in_body, (), ahead, impulses)
+    x, y, z = total(each(lag, (), was, shall_be, robot.casters))
+    return scale * x, scale * y, scale * z
+
+
+def moved(h: Scalar, state: State, along: State) -> State:
+    """The state h seconds on with the velocities of another; its own velocities as they are."""
+    (c, s), (vx, vy, omega) = along.heading, along.twist
+    position = state.position[0] + h * (c * vx - s * vy), state.position[1] + h * (s * vx + c * vy)
+    directions = each(steered, (h, omega), state.directions, along.rates)
+    return State(position, turned(state.heading, h * omega), state.twist, directions, state.rates, state.tilt)
+
+
+def with_velocities(state: State, twist: Vector, rates: tuple[Pair, ...], tilt: Pair) -> State:
+    """The state with other velocities."""
+    return State(state.position, state.heading, twist, state.directions, rates, tilt)
+
+
+def mean_force(rate: Scalar, wheel: Grip) -> Pair:
+    """Force of the floor on a wheel along f and f⊥. [N]"""
+    return rate * wheel.impulse[0], rate * wheel.impulse[1]
+
+
+def slip_step(
+    state: State,
+    torques: tuple[Pair, ...],
+    wrench: Vector,
+    h: Scalar,
+    frictions: tuple[Scalar, ...],
+    robot: RobotParameters,
+) -> tuple[State, Footfall]:
+    """One step of h seconds under constant torques and wrench; frictions: coefficients of the floor, a wheel each."""
+    nothing = (0.0 * state.twist[0], 0.0 * state.twist[0], 0.0 * state.twist[0])
+    half = 0.5 * h
+    there = moved(half, state, state)
+    part = stage(half, state, state, there.directions, nothing, torques, wrench, robot)
+    limits = each(limit_of, (half,), frictions, wheel_loads(state.directions, state.tilt, robot))
+    slips = each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters)
+    slides = each(sliding, (), slips, limits)
+    change = nothing
+    problem = part.inertia, part.force, part.footings, limits
+    change, slides = newton_round(change, 0.5, problem, slides)
+    change, slides = newton_round(change, 0.0, problem, slides)
+    change, grips = cut_impulses(change, problem, slides)
+    rates = rates_after(change, grips, part, robot)
+    middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
+    tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
+    end = moved(h, state, middle)
+    known = turning_lag(grips, 2.0, middle.directions, end.directions, robot)
+    part = stage(h, state, middle, end.directions, known, torques, wrench, robot)
+    halfway = each(slip_velocity, (middle.twist,), middle.directions, rates, robot.casters)
+    against = each(lasting_slide, (), slips, halfway, each(free_of, (), part.footings))
+    footings = each(opposing, (), part.footings, against)
+    loads = wheel_loads(middle.directions, tilted, robot)
+    before, limits = limits, each(limit_of, (h,), frictions, loads)
+    slides = each(slower, (), before, limits, slides)
+    change = (2.0 * change[0], 2.0 * change[1], 2.0 * change[2])
+    problem = part.inertia, part.force, footings, limits
+    change, slides = newton_round(change, 0.5, problem, slides)
+    change, slides = newton_round(change, 0.0, problem, slides)
+    change, grips = final_impulses(change, problem, slides)
+    rates = rates_after(change, grips, part, robot)
+    tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
+    end = with_velocities(end, add(state.twist, change), rates, tilted)
+    slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
+    answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))
+    forces, uses = each(mean_force, (1.0 / h,), grips), each(used_share, (), grips, limits)
+    return end, Footfall(slips, forces, each(pressing, (), loads), uses, answer)

@@ -1,0 +1,127 @@
+"""Impacts of the robot whose wheels may slip. docs/equations.md, section S.
+
+The wheels answer to an impulse on the platform as the floor lets them: over the contact time it holds a wheel by no
+more than friction · load · time. A wheel that slides already is not held; its friction acts over the time step anyway.
+"""
+
+from typing import NamedTuple
+
+from caster_gym.mechanics.contact_impulses import RESTING
+from caster_gym.mechanics.dynamics import platform_inertia
+from caster_gym.mechanics.floor import Surface
+from caster_gym.mechanics.floor_friction import (
+    Footing,
+    Grip,
+    Limit,
+    final_impulses,
+    floor_stiffness,
+    grip,
+    impulse_limit,
+    slide_of,
+    used_share,
+)
+from caster_gym.mechanics.free_casters import (
+    Border,
+    OwnInertia,
+    Pair,
+    border,
+    edge_inertia,
+    floor_mobility,
+    floor_rows,
+    follow,
+    own_inertia,
+    push_back,
+    slip_velocity,
+    without_friction,
+)
+from caster_gym.mechanics.ground import wheel_loads
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.linear import solve
+from caster_gym.mechanics.parameters import RobotParameters
+from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, add, clip, each, greatest, sqrt, total
+from caster_gym.mechanics.slip import footing, impulse_of, pushed, with_velocities
+
+
+class ImpactFooting(NamedTuple):
+    """How all wheels meet the floor in an impact."""
+
+    inertia: Symmetric  # of the platform with casters that answer freely
+    footings: tuple[Footing, ...]
+    limits: tuple[Limit, ...]
+    slides: tuple[Scalar, ...]  # rho to start with
+    owns: tuple[OwnInertia, ...]
+    edges: tuple[Border, ...]
+
+
+def scaled_load(contact_time: Scalar, friction: Scalar, load: Scalar) -> Scalar:
+    """What the floor can hold over the contact time. [N s]"""
+    return contact_time * friction * load
+
+
+def fading_limit(most: Scalar, u: Pair) -> Limit:
+    """Greatest impulse of the floor on a wheel; none on one that slides already."""
+    slides = sqrt(u[0] * u[0] + u[1] * u[1])
+    return impulse_limit(most * clip(2.0 - slides / RESTING, 0.0 * slides, 1.0 + 0.0 * slides))  # (S15)
+
+
+def held_at_first(limit: Limit) -> Scalar:
+    """rho of a wheel that is held."""
+    return 0.0 * limit.most
+
+
+def impact_footing(state: State, surface: Surface, robot: RobotParameters) -> ImpactFooting:
+    """How the wheels of a robot that is about to be struck meet the floor."""
+    owns = each(own_inertia, (), each(without_friction, (), robot.casters), robot.casters)
+    edges = each(border, (), state.directions, owns, robot.casters)
+    before = slips_of(state, robot)
+    rows = each(floor_rows, (), state.directions, edges, robot.casters)
+    loads = wheel_loads(state.directions, state.tilt, robot)
+    most = each(scaled_load, (surface.contact_time,), surface.frictions, loads)
+    limits = each(fading_limit, (), most, before)
+    return ImpactFooting(
+        add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges))),
+        each(footing, (), before, rows, each(floor_mobility, (), owns, robot.casters)),
+        limits,
+        each(held_at_first, (), limits),
+        owns,
+        edges,
+    )
+
+
+def at_rest_impulse(foot: Footing, wheel: Grip) -> Vector:
+    """Impulse on the platform of a wheel's friction if the twist does not change, for the stiffness that it has."""
+    a, b = foot.rows
+    xx, xy, yy = wheel.stiffness
+    p, q = -xx * foot.free[0] - xy * foot.free[1], -xy * foot.free[0] - yy * foot.free[1]
+    return a[0] * p + b[0] * q, a[1] * p + b[1] * q, a[2] * p + b[2] * q
+
+
+def held_answer(
+    change: Vector, slides: tuple[Scalar, ...], floor: ImpactFooting, v: Vector
+) -> tuple[Vector, Symmetric, tuple[Scalar, ...]]:
+    """Twist before the obstacles' impulse, and what answers to it, for wheels that slide as after a change."""
+    grips = each(grip, (change, 1.0), floor.footings, floor.limits, slides)
+    answer = add(floor.inertia, total(each(floor_stiffness, (), floor.footings, grips)))
+    before = solve(answer, total(each(at_rest_impulse, (), floor.footings, grips)))
+    return add(v, before), answer, each(slide_of, (), grips)
+
+
+def answered_impact(
+    wrench: Vector,
+    change: Vector,
+    slides: tuple[Scalar, ...],
+    floor: ImpactFooting,
+    state: State,
+    robot: RobotParameters,
+) -> tuple[State, Scalar]:
+    """State after an impulse of obstacles at C, and the greatest share of the floor's friction that a wheel used."""
+    change, grips = final_impulses(change, (floor.inertia, wrench, floor.footings, floor.limits), slides)
+    answers = each(push_back, (), each(impulse_of, (), grips), floor.owns, robot.casters)
+    rates = each(follow, (change,), each(pushed, (), state.rates, answers), floor.edges)
+    uses = each(used_share, (), grips, floor.limits)
+    return with_velocities(state, add(state.twist, change), rates, state.tilt), greatest(uses)
+
+
+def slips_of(state: State, robot: RobotParameters) -> tuple[Pair, ...]:
+    """Velocities of all wheels over the floor along f and f⊥. [m/s]"""
+    return each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters)
