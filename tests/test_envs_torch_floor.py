@@ -26,7 +26,7 @@ def test_episodes_among_obstacles_are_those_of_the_compiled_batch():
 
 
 def test_single_precision_stays_within_a_millimetre():
-    """Over 40 periods: 160 steps of 1.2e-7, spread by casters that swing freely; no wheel's slip starts or ends late."""
+    """Over 40 periods: 160 steps of 1.2e-7, spread by casters that swing freely."""
     theirs, ours = both("track", 8, dtype=torch.float32, corridor=5.0, max_episode_steps=1000, floor=ISLANDS)
     theirs.reset(seed=5), ours.reset(seed=5)
     for actions in random_actions(8, 6, 40):
