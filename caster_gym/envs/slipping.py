@@ -93,23 +93,15 @@ def _counted(went: Any, slip: Any) -> Any:
 
 @register_jitable(**INLINE)
 def feel_floor(desk: Any, lanes: Any, floor: Any, sizes: Sizes) -> None:
-    """Look up the floor's friction under each wheel."""
+    """Look up the floor's friction under each wheel, patch by patch, so that the loops over lanes stay SIMD."""
     if floor is None:
         return
     row = friction_row(sizes)
     for lane in range(lanes):
         robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
         write(desk, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
-    _feel_patches(desk, lanes, row, floor.patches, sizes)
-
-
-@register_jitable(**INLINE)
-def _feel_patches(desk: Any, lanes: Any, row: Any, patches: Any, sizes: Sizes) -> None:
-    """Patch by patch, so that the loops over lanes stay SIMD."""
-    if patches is None:
-        return
-    for k in range(len(patches)):
-        patch = patches[k, 0], patches[k, 1], patches[k, 2], patches[k, 3]
+    for k in range(len(floor.patches)):
+        patch = floor.patches[k, 0], floor.patches[k, 1], floor.patches[k, 2], floor.patches[k, 3]
         for lane in range(lanes):
             state = read_state(desk, lane, 0, sizes.casters)
             robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)

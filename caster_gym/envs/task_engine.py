@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.engines.compilation import compilations, included
+from caster_gym.engines.free_wheels import check_free_wheels
 from caster_gym.engines.held import Held
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.memory import check_memory
@@ -22,7 +23,8 @@ from caster_gym.envs.infos import named
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan
 from caster_gym.envs.scene import Scene, draw_scene
-from caster_gym.mechanics.floor import floor_table
+from caster_gym.floor import Floor
+from caster_gym.mechanics.floor import FloorTable, floor_table
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.mechanics.separation import Obstacles
 from caster_gym.robot import Robot
@@ -48,6 +50,9 @@ class TaskEngine:
 
     def __init__(self, robot: Robot, plan: Plan, pace: Pace, observed: ObservationLayout, count: int) -> None:
         check_time_step(robot, pace.time_step, pace.substeps)
+        if pace.floor is not None:
+            numbers = np.array([pack_parameters(robot_parameters(robot))])
+            check_free_wheels(f"robot {robot.name!r}", numbers, pace.time_step, pace.substeps)
         self.robot, self.plan, self.layout, self.count = robot, plan, observed, count
         self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
         self._pace = pace
@@ -94,7 +99,7 @@ class TaskEngine:
             hull=plan.around.hull if among else None,
             obstacles=plan.around.obstacles if among else None,
             arenas=plan.arenas if among else None,
-            floor=None if floor is None else floor_table(floor),
+            floor=None if floor is None else _table(floor),
             substeps=self._pace.substeps,
             time_step=self._pace.time_step,
         )
@@ -326,6 +331,8 @@ class TaskEngine:
         """Refuse robots of numbers (robots, fields) that the time step cannot follow; what: their name in the error."""
         called = f"robots like {self.robot.name!r} of other numbers" if what is None else what
         check_rows(called, rows, self._pace.time_step, self._pace.substeps)
+        if self._pace.floor is not None:
+            check_free_wheels(called, rows, self._pace.time_step, self._pace.substeps)
 
     def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64], *, checked: bool = False) -> None:
         """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`.
@@ -390,3 +397,9 @@ class TaskEngine:
     def _obstacles_beside(self, path: int) -> Obstacles:
         around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
         return around._replace(radii=around.radii[near:end], spans=around.spans[near:end])
+
+
+def _table(floor: Floor) -> FloorTable:
+    """The numbers of a floor, of one type whether there are patches or not: so that one compilation does for all."""
+    table = floor_table(floor)
+    return table._replace(patches=np.zeros((0, 4)) if table.patches is None else table.patches)
