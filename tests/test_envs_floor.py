@@ -3,6 +3,8 @@
 import copy
 import json
 import pickle
+import re
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +16,7 @@ from caster_gym import Model, load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.floor import Floor, Patch
 from caster_gym.wrappers import Friction, wrap
 
 ICE = {"friction": 0.05}
@@ -264,6 +267,52 @@ def test_a_task_comes_back_from_what_is_written_of_it(kind):
         task = kind(floor=floor)
         assert kind(**task.model_dump(mode="json")) == task
     assert kind().floor == "grip"
+
+
+@pytest.mark.parametrize("place", [0, 5, 8, 13, 18, 20])  # of pose, twist, direction, yaw and roll rate, tilt
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+def test_a_state_that_is_not_finite_is_failure(place, bad):
+    env = alone(floor=ICE)
+    env.reset(seed=0)
+    states = env.engine.states
+    states[0, place] = bad
+    env.engine.states = states
+    observation, reward, terminated, _, info = env.step(np.full(6, 0.1, dtype=np.float32))
+    assert terminated and reward == 0.0
+    assert info["not_finite"] or (bad == 1e200 and info["left_corridor"])
+    assert env.observation_space.contains(observation)
+    observation, info = env.reset()
+    assert env.observation_space.contains(observation)
+    assert np.isfinite(env.engine.states).all() and np.isfinite(info["wheel_slip"]).all()
+
+
+def test_the_code_of_the_page_runs(capsys):
+    page = Path("docs/floor.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.M | re.S)
+    exec(compile(code, "docs/floor.md", "exec"), {})
+    assert capsys.readouterr().out.count("[") == 1
+
+
+def test_the_keys_of_the_page_are_those_that_are_read():
+    """Each field of a floor and of a patch has a row, and defaults are those told."""
+    page = Path("docs/floor.md").read_text(encoding="utf-8")
+    keys = re.findall(r"^\| (`.*?) \|", page, re.M)
+    told = {name for key in keys for name in re.findall(r"`(\w+)`", key)}
+    assert told == set(Floor.model_fields) | set(Patch.model_fields)
+    assert f"| {Floor().contact_time:g} | s |" in page
+
+
+def test_the_scene_shows_how_wheels_slip_and_what_the_floor_gives():
+    """Full torque at a standstill on ice: treads run backwards, forces point ahead, of friction times load each."""
+    env = alone(floor={"friction": 0.05, "patches": [{"x": 3.0, "y": 0.0, "radius": 0.1, "friction": 0.5}]})
+    info = straight(env, 1.0, 3)[-1]
+    scene = env.engine.scene(0)
+    assert scene.floor == env.task.floor
+    assert (scene.slip[:, 0] < -0.1).all()
+    assert_allclose(np.hypot(*scene.slip.T), info["wheel_slip"], rtol=0.2)  # now, and the greatest within the period
+    loads = Model(env.robot).wheel_loads(np.zeros(3))
+    assert_allclose(np.hypot(*scene.ground_forces.T), 0.05 * loads, rtol=0.05)  # accelerating shifts the loads a little
+    assert (scene.ground_forces[:, 0] > 0.0).all()
 
 
 @pytest.mark.parametrize(
