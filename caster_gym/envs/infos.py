@@ -27,11 +27,16 @@ _POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIR
 _IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
 
 
-def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any]:
+def named(reports: NDArray[np.float64], terms: tuple[str, ...], slipping: int = 0) -> dict[str, Any]:
     """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
 
     Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
+    slipping: how many wheels may slip, whose slips stand behind the torques.
     """
+    if slipping:
+        infos = named(reports[:-slipping], terms)
+        infos["wheel_slip"] = reports[-slipping:].T
+        return infos
     row: Any = reports
     if reports.ndim > 1:
         left, unfinite, touched = reports[:ENDINGS] > 0.0
