@@ -68,8 +68,8 @@ class CasterTrackEnv(CasterEnv):
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
 
     **Impacts** act through the whole inertia, as if the floor could keep the wheels from slipping whatever that takes.
-    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller, which `floor` takes in. Head-on into a
-    smooth wall at 0.5 m/s with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
+    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller, which `floor` takes in. Head-on into
+    a smooth wall at 0.5 m/s with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
 
     | robot | impact_traction | impulse here | MuJoCo's, whose wheels slip | sideways here | MuJoCo's |
     |---|---|---|---|---|---|
