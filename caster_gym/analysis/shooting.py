@@ -12,6 +12,7 @@ The derivatives are those of the simulator's steps, by forward differentiation w
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any, cast
 
 import numpy as np
@@ -63,6 +64,16 @@ class Shooting:
         self._rolls = recording.rolling is not None
         self._plain = self._torque({}) if not acts({**known, **dict.fromkeys(names, 0.0)}) else None
         self._angle = np.isin(np.array(recording.kinds)[self.observed], ("heading", "steering"))
+        self._pushes = np.zeros((self.count, self._substeps * (self.length - 1), 2 * robot.caster_count, 0))
+
+    def with_pushes(self, pushes: Array) -> "Shooting":
+        """The same with K more values behind those of the unknowns, each a factor of further torques.
+
+        pushes (W, k (S − 1), 2 N, K): torques that act at the joints over each step, for factors of one. [N m]
+        """
+        wider = copy(self)
+        wider._pushes = pushes
+        return wider
 
     def first_guess(self, values: Array) -> Array:
         """Starts as measured; where velocities were not, from a parabola through the poses nearby."""
@@ -74,7 +85,7 @@ class Shooting:
     def predict(self, starts: Array, values: Array) -> Array:
         """The predicted path; not finite where the simulation ran away."""
         model = Model(self.robot, parameters=self._parameters(values))
-        torque = self._torque(self._named(values)).swapaxes(0, 1)
+        torque = self._pushed_torque(values).swapaxes(0, 1)
         with np.errstate(all="ignore"):
             path = model.simulate(starts[:, : self._state], torque, self._step, len(torque), checked=True)
         if self._rolls:
@@ -140,53 +151,76 @@ class Shooting:
     def _slopes_of(self, function: Callable[[Array], Array], values: Array) -> Array:
         """Derivatives (…, P) of a function of the values, by differences."""
         slopes = []
-        for i, (name, value) in enumerate(zip(self.names, values, strict=True)):
+        for i, (name, value) in enumerate(zip(self.names, values[: len(self.names)], strict=True)):
             aside = _ASIDE * (abs(value) or 1.0)
             low, high = values.copy(), values.copy()
             low[i], high[i] = value - aside, value + aside
             if name == "motor_lag":
                 low[i] = max(low[i], 0.0)
             slopes.append((function(high) - function(low)) / (high[i] - low[i]))
-        return np.stack(slopes, axis=-1)
+        rest = [np.zeros_like(slopes[0])] * (len(values) - len(slopes))
+        return np.stack([*slopes, *rest], axis=-1)
 
     def _step_derivatives(self, states: Array, values: Array) -> Array:
-        """Derivatives (W, k (S − 1), 6 + N, 6 + N + P) of each step's end with respect to its start and the values."""
-        width, count = states.shape[-1], len(values)
-        flat = torch.as_tensor(states.reshape(-1, width))
+        """Derivatives (W, k (S − 1), 6 + N, 6 + N + P + K) of each step's end with respect to its start and values."""
+        width, own = states.shape[-1], len(self.names)
         joints = 2 * self.robot.caster_count
-        torques = torch.as_tensor(self._torque(self._named(values)).reshape(-1, joints))
-        pushed = torch.zeros((len(flat), joints, count), dtype=torch.float64)
-        if self._plain is None:
-            moved = self._slopes_of(lambda values: self._torque(self._named(values)), values)
-            pushed = torch.as_tensor(moved.reshape(-1, joints, count))
-        seeds = torch.eye(width + count, dtype=torch.float64)
+        pushed = self._torque_slopes(values)  # (W, k (S − 1), 2 N, P + K)
+        seen = joints if pushed is not None else 0
+        seeds = torch.eye(width + own + seen, dtype=torch.float64)
+        flat = torch.as_tensor(states.reshape(-1, width))
+        torques = torch.as_tensor(self._pushed_torque(values).reshape(-1, joints))
         lanes = max(1, _TOGETHER // len(seeds))
         parts = [
-            self._tangents(state, torque, push, torch.as_tensor(values), seeds)
-            for state, torque, push in zip(*(torch.split(one, lanes) for one in (flat, torques, pushed)), strict=True)
+            self._tangents(state, torque, torch.as_tensor(values), seeds)
+            for state, torque in zip(torch.split(flat, lanes), torch.split(torques, lanes), strict=True)
         ]
-        slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy()
-        return slopes.reshape(*states.shape, width + count)
+        slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy().reshape(*states.shape, len(seeds))
+        if pushed is None:
+            return slopes
+        whole = np.concatenate([slopes[..., : width + own], np.zeros((*states.shape, len(values) - own))], axis=-1)
+        whole[..., width:] += slopes[..., width + own :] @ pushed
+        return whole
 
     def _tangents(
-        self, state: torch.Tensor, torque: torch.Tensor, pushed: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
+        self, state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
     ) -> torch.Tensor:
-        """How one step's ends (L, 6 + N) change along each of some directions of state and values, one a seed.
+        """How one step's ends (L, 6 + N) change along each of some directions of state, values and torque, one a seed.
 
-        pushed (L, 2 N, P): how the torques change with the values.
+        Seeds (…, 6 + N + P), or (…, 6 + N + P + 2 N) where torques change too.
         """
+        width, joints = state.shape[1], torque.shape[1]
 
         def end(state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
             model = TorchModel(self.robot, parameters=self._parameters(values))
             both: Any = model.simulate(cast(Any, state), cast(Any, torque), self._step, 1)
             return cast(torch.Tensor, both[1])
 
+        own = values[: len(self.names)]
+        places = [width, len(own), seeds.shape[1] - width - len(own)]
+
         def along(seed: torch.Tensor) -> torch.Tensor:
-            of_state, of_values = seed[: state.shape[1]].expand_as(state), seed[state.shape[1] :]
-            tangents = (of_state, pushed @ of_values, of_values)
-            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, values), tangents)[1])
+            of_state, of_values, of_torque = torch.split(seed, places)
+            if not len(of_torque):
+                of_torque = torch.zeros(joints, dtype=torch.float64)
+            tangents = (of_state.expand_as(state), of_torque.expand_as(torque), of_values)
+            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, own), tangents)[1])
 
         return torch.vmap(along)(seeds)
+
+    def _torque_slopes(self, values: Array) -> Array | None:
+        """Derivatives (W, k (S − 1), 2 N, P + K) of the torques with respect to the values; none if they are fixed."""
+        if self._plain is not None and not self._pushes.shape[-1]:
+            return None
+        moved = np.zeros((*self._pushes.shape[:-1], len(self.names)))
+        if self._plain is None:
+            moved = self._slopes_of(lambda values: self._torque(self._named(values)), values[: len(self.names)])
+        return np.concatenate([moved, self._pushes], axis=-1)
+
+    def _pushed_torque(self, values: Array) -> Array:
+        """Torques (W, k (S − 1), 2 N) that act over each step, with what pushes besides."""
+        torque, further = self._torque(self._named(values)), values[len(self.names) :]
+        return torque + self._pushes @ further if len(further) else torque
 
     def _torque(self, values: Mapping[str, float]) -> Array:
         """Torques (W, k (S − 1), 2 N) that act over each step."""
