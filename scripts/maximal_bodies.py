@@ -58,8 +58,8 @@ _LX, _LY, _LINK_YAW, _WX, _WY, _WHEEL_YAW, _ROLL, _STEER = range(_CASTER)
 class MaximalBodies:
     """Robots of one kind, each joint with a friction law."""
 
-    def __init__(self, robot: Robot, law: FrictionLaw = FrictionLaw()) -> None:
-        self.robot, self.law, self.count = robot, law, robot.caster_count
+    def __init__(self, robot: Robot, law: FrictionLaw | None = None) -> None:
+        self.robot, self.law, self.count = robot, law or FrictionLaw(), robot.caster_count
         casters, n = robot.casters, robot.caster_count
         self.radius = np.array([one.radius for one in casters])
         self.trail, self.offset = (np.array([getattr(one, key) for one in casters]) for key in ("trail", "offset"))
@@ -75,7 +75,9 @@ class MaximalBodies:
         for i, one in enumerate(casters):
             wheel = [one.wheel.mass, one.wheel.mass, one.wheel.yaw_inertia, one.wheel.spin_inertia]
             own = np.diag([one.link.mass, one.link.mass, one.link.inertia, *wheel, 0.0])
+            gear = np.array(one.gear)
             own[_ROLL:, _ROLL:] += np.diag([one.roll.armature, one.steer.armature])
+            own[_ROLL:, _ROLL:] += gear.T @ np.diag([one.roll.rotor, one.steer.rotor]) @ gear
             place = self._at(i)
             mass[place, place] = own
         self.mass = mass
@@ -106,7 +108,7 @@ class MaximalBodies:
             rows[:, [k, k + 1], [0, 1]] = 1.0
             rows[:, k : k + 2, 2] = _across(arm[i])
             rows[:, [k, k + 1], [at + _LX, at + _LY]] = -1.0
-            rows[:, k : k + 2, at + _LINK_YAW] = _across(to_com[:, i])  # the pivot lies at − to_com from its mass centre
+            rows[:, k : k + 2, at + _LINK_YAW] = _across(to_com[:, i])  # it lies at − to_com from there
             known[:, k : k + 2] = omega[:, None] ** 2 * arm[i] + yaw[:, i, None] ** 2 * to_com[:, i]
             # the wheel's centre is a point of the link
             ahead = to_wheel[:, i] - to_com[:, i]

@@ -52,8 +52,10 @@ def test_without_noise_the_truth_is_found(name, seed, starts, with_twist):
     robot, truth = load_robot(name), TRUTH[name]
     recording = record(robot_with(robot, truth), 4.0, 0.02, seed=seed)
     found = identify(robot, recording if with_twist else recording.without_twist(), tuple(truth), starts)
-    # only rounding, magnified by directions of up to 1e4 standard deviations, parts a perfect fit from the truth
-    assert_allclose(found.estimates, list(truth.values()), rtol=1e-6)
+    # steps of the fit are corrected to those of the recording to first order; friction is told less well than the rest
+    assert_allclose(found.estimates, list(truth.values()), rtol=1e-2)
+    assert_allclose(found.estimates[[0, 1, 2, -1]], np.array(list(truth.values()))[[0, 1, 2, -1]], rtol=1e-4)
+    assert (np.abs(found.estimates - list(truth.values())) < found.half_widths).all()
     assert found.untold == ()
     assert found.warnings == ()
     assert found.robot.casters == robot_with(robot, dict(zip(truth, found.estimates, strict=True))).casters

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.analysis.friction_allowance import Allowance, allow_for_friction
+from caster_gym.analysis.friction_shape import JOINTS, Shapes
 from caster_gym.analysis.recording import KIND_UNITS, Noise, Recording
 from caster_gym.analysis.recording_check import check_recording
 from caster_gym.analysis.shooting import Shooting
@@ -33,11 +35,15 @@ from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
 
+_CLOSE = 100.0  # squared distance to the optimum, in standard deviations, from which the last part of a fit goes on
 _SHORT = 0.25  # [-] of a window, for a first fit that far starting values do not lead astray
 _LEAST_NOISE = 1e-9  # [m, rad, …] standard deviation below which rounding and time steps decide
 _EXACT = 1e-5  # [-] of a quantity's own variation: errors so small are those of time steps, not of a sensor
 _SURE = 4.0  # standard deviations beyond which chance no longer explains a misfit
 _ENTANGLED = 0.98  # [-] correlation from which two estimates are said to be entangled
+_SURE_GAIN = 5.0  # logarithm of a ratio of likelihoods; chance alone gives it once in some 300 recordings
+_SMALL_FRICTION = 1e-4  # [-] of a motor's greatest torque: a departure so small is that of time steps
+_OF_FRICTION = (("roll_viscous", "roll_coulomb"), ("steer_viscous", "steer_coulomb", "scrub"))  # rests on the law
 _PART = 0.1  # [-] share of a direction from which an unknown takes part in it
 
 
@@ -67,6 +73,7 @@ class Identification:
     agreements: tuple[Agreement, ...]
     untold: tuple[str, ...]  # sentences: what the recording cannot tell
     warnings: tuple[str, ...]  # sentences: what the intervals do not cover
+    doubted: tuple[str, ...]  # names of unknowns whose intervals the warnings call into question
     notes: tuple[str, ...]  # sentences: small contradictions, and what is told apart only just
     shooting: Shooting
     before: Array  # (W, S, observed) predicted with the starting values, from the same initial states
@@ -100,7 +107,8 @@ def identify(
     Raises ValueError for names that are not known, a recording of another number of casters, a window that is not
     positive and a confidence that does not lie between 0 and 1.
     """
-    starts, width = dict(starts or {}), _quantile(confidence)
+    starts = dict(starts or {})
+    _quantile(confidence)  # refused now and not after the fit
     if not window > 0.0:
         raise ValueError(f"the window must be positive, got {window:g} s")
     lasts = recording.time_step * (len(recording.pose) - 1)
@@ -123,12 +131,17 @@ def identify(
     short, shooting = (Shooting(robot, recording, names, starts, share * window, dynamics) for share in (_SHORT, 1.0))
     rough = fit(short, short.first_guess(first), first, scales, limits, levels.at_first, levels.update, np.inf, report)
     nearer = short.starts_on(shooting, rough.point.path)
-    found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, report=report)
-    untold = found.told.untold  # what is not told goes back to where it started, which the recording does not notice
-    values = found.point.values + scales * (untold @ (untold.T @ ((first - found.point.values) / scales)))
-    agreements = _agreements(found, shooting, levels, first)
-    deviations, correlations = _spread(found, scales, agreements)
-    half_widths = deviations * width
+    found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, _CLOSE, report)
+    shapes = Shapes(robot)
+    allowed = allow_for_friction(shooting, shapes, found, scales, limits, levels.update, levels.kinds, report)
+    reached, untold = allowed.point.values, found.told.untold
+    # what is not told goes back to where it started, which the recording does not notice
+    values = reached + scales * (untold @ (untold.T @ ((first - reached) / scales)))
+    agreements = _agreements(allowed, shooting, levels, first)
+    deviations, half_widths, correlations = _spread(found, allowed, scales, agreements, confidence)
+    friction, doubted = _friction_words(allowed, shapes, shooting, names)
+    if not all(one.explained for one in agreements):
+        doubted = list(names)
     return Identification(
         robot=robot_with(robot, {**starts, **dict(zip(names, map(float, values), strict=True))}),
         unknowns=chosen,
@@ -139,12 +152,13 @@ def identify(
         confidence=confidence,
         agreements=agreements,
         untold=tuple(_untold_words(found.told.untold, chosen)),
-        warnings=tuple(_warning_words(found, chosen, agreements, half_widths)),
+        warnings=(*_warning_words(found, allowed, chosen, agreements, half_widths), *friction),
+        doubted=tuple(doubted),
         notes=(*notes, *_entangled_words(correlations, chosen)),
         shooting=shooting,
-        before=shooting.at_samples(shooting.predict(found.point.starts, first), first),
-        after=shooting.at_samples(shooting.predict(found.point.starts, values), values),
-        steps=rough.steps + found.steps,
+        before=shooting.at_samples(shooting.predict(allowed.point.starts, first), first),
+        after=shooting.measured + allowed.point.errors,
+        steps=rough.steps + found.steps + allowed.looks,
     )
 
 
@@ -205,7 +219,7 @@ class _Levels:
         return np.array([max(levels[kind], _LEAST_NOISE) for kind in self.kinds])
 
 
-def _agreements(found: Fit, shooting: Shooting, levels: _Levels, first: Array) -> tuple[Agreement, ...]:
+def _agreements(found: Allowance, shooting: Shooting, levels: _Levels, first: Array) -> tuple[Agreement, ...]:
     left = levels.left(found.normal, found.told)
     before = point_at(shooting, found.point.starts, first).errors
     agreements = []
@@ -227,33 +241,40 @@ def _agreements(found: Fit, shooting: Shooting, levels: _Levels, first: Array) -
     return tuple(agreements)
 
 
-def _spread(found: Fit, scales: Array, agreements: Sequence[Agreement]) -> tuple[Array, Array]:
-    """Standard deviations and correlations of the estimates.
+def _spread(
+    found: Fit, allowed: Allowance, scales: Array, agreements: Sequence[Agreement], confidence: float
+) -> tuple[Array, Array, Array]:
+    """Standard deviations, half widths of intervals and correlations of the estimates.
 
-    Where noise does not explain the errors, these count instead of it, and so does, if it is more, how far apart the
-    windows would have the estimates.
+    Where noise does not explain the errors, these count instead of it. Errors that vary slowly are worth fewer samples:
+    if the ratio of their variance to that between successive samples is r = 1 / (1 − ρ), as if each kept the share ρ of
+    the one before, (1 + ρ) / (1 − ρ) = 2 r − 1 times fewer. How far apart the windows would have the estimates counts
+    too, if it is more, and the intervals are then Student's for as many windows.
     """
-    directions, strengths = found.told.directions, found.told.strengths
-    covariance = directions / strengths @ directions.T
-    excess = max((one.left / one.noise for one in agreements if one.given and not one.explained), default=1.0)
-    variances = np.diag(covariance) * max(excess, 1.0) ** 2
-    if not all(one.explained for one in agreements):
-        pulls = covariance @ found.normal.gradients.T
-        windows = len(found.normal.gradients)
+    covariance = allowed.covariance
+    unexplained = [one for one in agreements if not one.explained]
+    ratios = [(one.left / max(one.noise, _LEAST_NOISE)) ** 2 for one in unexplained]
+    slow = max((r if one.given else 2.0 * r - 1.0 for one, r in zip(unexplained, ratios, strict=True)), default=1.0)
+    variances, width = np.diag(covariance) * max(slow, 1.0), _quantile(confidence)
+    if unexplained:
+        pulls = allowed.spread @ allowed.normal.gradients.T
+        windows = pulls.shape[1]
         variances = np.maximum(variances, (pulls**2).sum(axis=1) * windows / max(windows - 1, 1))
+        width = _quantile(confidence, max(windows - 1, 1))
     known = ((found.told.untold**2).sum(axis=1) < _PART**2) & ~found.at_bounds
     deviations = np.where(known, scales * np.sqrt(variances), np.inf)
     own = np.sqrt(np.where(known, np.diag(covariance), np.nan))
-    return deviations, covariance / np.outer(own, own)
+    return deviations, deviations * width, covariance / np.outer(own, own)
 
 
-def _quantile(confidence: float) -> float:
-    """Half width of an interval in standard deviations."""
-    from scipy.stats import norm
+def _quantile(confidence: float, freedom: int | None = None) -> float:
+    """Half width of an interval in standard deviations: a normal quantile, or Student's of some freedom."""
+    from scipy.stats import norm, t
 
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"the confidence must lie between 0 and 1, got {confidence:g}")
-    return float(norm.ppf(0.5 + 0.5 * confidence))
+    share = 0.5 + 0.5 * confidence
+    return float(norm.ppf(share) if freedom is None else t.ppf(share, freedom))
 
 
 def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
@@ -294,13 +315,35 @@ def _entangled_words(correlations: Array, chosen: Sequence[Unknown]) -> list[str
     return sentences
 
 
+def _friction_words(
+    allowed: Allowance, shapes: Shapes, shooting: Shooting, names: Sequence[str]
+) -> tuple[list[str], list[str]]:
+    """A sentence for each kind of joint whose friction surely departs from the law, and what it makes doubtful."""
+    sentences, doubted = [], []
+    for joint, (kind, rates) in enumerate(zip(JOINTS, shapes.rates(shooting, allowed.point), strict=True)):
+        extra = shapes.torque(joint, rates, allowed.factors)
+        worst = int(np.abs(extra).argmax())
+        small = abs(extra[worst]) < _SMALL_FRICTION * shapes.greatest[joint]
+        if small or allowed.believed.gains[2 * joint : 2 * joint + 2].max() < _SURE_GAIN:
+            continue
+        own = [name for name in names if kind_of(name) in _OF_FRICTION[joint]]
+        doubted += own
+        sentences.append(
+            f"Friction of the {kind} joints does not follow the model's law: at {rates[worst]:.2g} rad/s it is "
+            f"{abs(extra[worst]):.2g} N m {'greater' if extra[worst] > 0.0 else 'less'}. The other estimates and their "
+            "intervals allow for that"
+            + (f", but {' and '.join(own)} {'is' if len(own) == 1 else 'are'} not to be trusted." if own else ".")
+        )
+    return sentences, doubted
+
+
 def _warning_words(
-    found: Fit, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
+    found: Fit, allowed: Allowance, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
 ) -> list[str]:
-    sentences = []
-    if not found.converged:
-        sentences.append(f"The fit did not settle within {found.steps} steps; the numbers are where it stopped.")
-    for one, value, at_bound in zip(chosen, found.point.values, found.at_bounds, strict=True):
+    sentences, steps, point = [], found.steps + allowed.looks, allowed.point
+    if not (found.converged and allowed.settled):
+        sentences.append(f"The fit did not settle within {steps} steps; the numbers are where it stopped.")
+    for one, value, at_bound in zip(chosen, point.values, found.at_bounds, strict=True):
         if at_bound:
             sentences.append(
                 f"{one.name} went to its bound of {value:.4g} {one.unit}; beyond it the fit would be better."
@@ -313,10 +356,10 @@ def _warning_words(
     if unexplained:
         sentences.append(
             f"The model does not explain the recording: more errors are left than noise in {', '.join(unexplained)}. "
-            "Something that is not among the unknowns differs. The intervals are widened by how much the windows "
-            "disagree, but may still be too narrow."
+            "Something that is not among the unknowns differs. The intervals are widened, by how slowly errors vary "
+            "and by how much the windows disagree, but no estimate is to be trusted to within its interval."
         )
-    for one, value, half in zip(chosen, found.point.values, half_widths, strict=True):
+    for one, value, half in zip(chosen, point.values, half_widths, strict=True):
         if value + 2.0 * half < 0.0 and kind_of(one.name) not in SIGNED:
             sentences.append(f"{one.name} comes out negative, which no robot has: the model misses something else.")
     return sentences

@@ -20,7 +20,7 @@ import torch
 from numpy.typing import NDArray
 
 from caster_gym.analysis.acting import acting_torque, acts, shown_errors
-from caster_gym.analysis.recording import Recording, substeps_of
+from caster_gym.analysis.recording import FINER, Recording, substeps_of
 from caster_gym.analysis.rolling import rolled_along
 from caster_gym.analysis.unknowns import PARAMETERS, kind_of, parameters_with
 from caster_gym.engines.numpy_model import Model
@@ -84,7 +84,7 @@ class Shooting:
 
     def predict(self, starts: Array, values: Array) -> Array:
         """The predicted path; not finite where the simulation ran away."""
-        model = Model(self.robot, parameters=self._parameters(values))
+        model = Model(self.robot, parameters=self.parameters(values))
         torque = self._pushed_torque(values).swapaxes(0, 1)
         with np.errstate(all="ignore"):
             path = model.simulate(starts[:, : self._state], torque, self._step, len(torque), checked=True)
@@ -93,6 +93,22 @@ class Shooting:
             rolled = np.full_like(path[..., 6:], np.nan) if wild else rolled_along(model, path, torque, self._step)
             path = np.concatenate([path, starts[:, self._state :] + rolled], axis=-1)
         return path.swapaxes(0, 1)
+
+    def step_errors(self, path: Array, values: Array) -> Array:
+        """By how much FINER times as many steps end elsewhere than each step of a path (W, k (S − 1), of a state).
+
+        All steps are gone through side by side, so that this takes less time than a prediction.
+        """
+        model, width = Model(self.robot, parameters=self.parameters(values)), self._state
+        torque, fine = self._pushed_torque(values), self._step / FINER
+        states = model.simulate(path[:, :-1, :width], torque, fine, FINER, checked=True)
+        errors = states[-1] - path[:, 1:, :width]
+        angles = [2, *range(6, width)]
+        errors[..., angles] = np.mod(errors[..., angles] + np.pi, 2.0 * np.pi) - np.pi
+        if self._rolls:
+            rolled = rolled_along(model, states, torque, fine)[-1]
+            errors = np.concatenate([errors, rolled - np.diff(path[..., width:], axis=1)], axis=-1)
+        return errors
 
     def starts_on(self, coarser: "Shooting", path: Array) -> Array:
         """Starts of another cut of the recording, from a path of this one."""
@@ -111,23 +127,34 @@ class Shooting:
         return np.where(self._angle, turned, errors)
 
     def derivatives(self, path: Array, values: Array) -> tuple[Array, Array]:
-        """Derivatives of what is observed with respect to starts (W, S, observed, 6 + N) and values (…, P)."""
+        """Derivatives of what is observed with respect to starts (W, S, observed, 6 + N) and values (…, P + K)."""
+        of_starts, of_values, _ = self.derivatives_and_drift(path, values, None)
+        return of_starts, of_values
+
+    def derivatives_and_drift(
+        self, path: Array, values: Array, step_errors: Array | None
+    ) -> tuple[Array, Array, Array]:
+        """Derivatives, and what errors of the steps add up to in what is observed (W, S, observed), to first order."""
         slopes = self._step_derivatives(path[:, :-1, : self._state], values)
         width, count = self._state, len(values)
-        here = np.zeros((self.count, width, width + count))
+        here = np.zeros((self.count, width, width + count + 1))
         here[..., :width] = np.eye(width)
         chained = [here]
         for k in range(slopes.shape[1]):
             here = slopes[:, k, :, :width] @ here
-            here[..., width:] += slopes[:, k, :, width:]
+            here[..., width:-1] += slopes[:, k, :, width:]
+            if step_errors is not None:
+                here[..., -1] += step_errors[:, k, :width]
             chained.append(here)
         whole = np.stack(chained, axis=1)
         if self._rolls:
             whole = self._with_rolling(path, values, whole)
-            width = whole.shape[-1] - count
+            width = whole.shape[-1] - count - 1
+            if step_errors is not None:
+                whole[:, 1:, self._state :, -1] += np.cumsum(step_errors[..., self._state :], axis=1)
         observed = whole[:, :: self._substeps][:, :, self.observed]
         errors = self._slopes_of(lambda moved: self._shown_errors(moved)[self.observed], values)
-        return observed[..., :width], observed[..., width:] + errors
+        return observed[..., :width], observed[..., width:-1] + errors, observed[..., -1]
 
     def _with_rolling(self, path: Array, values: Array, whole: Array) -> Array:
         """Derivatives of states and of the wheels' angles, from those of states (W, …, 6 + N, 6 + N + P)."""
@@ -135,12 +162,12 @@ class Shooting:
         twist, steering = path[..., 3:6], path[..., 6:state]
 
         def rates(steering: Array, values: Array) -> Array:
-            return Model(self.robot, parameters=self._parameters(values)).rates(steering, twist)[1]
+            return Model(self.robot, parameters=self.parameters(values)).rates(steering, twist)[1]
 
-        model = Model(self.robot, parameters=self._parameters(values))
+        model = Model(self.robot, parameters=self.parameters(values))
         turned = (rates(steering + _ASIDE, values) - rates(steering - _ASIDE, values)) / (2.0 * _ASIDE)
         slopes = model.jacobian(steering)[..., ::2, :] @ whole[..., 3:6, :] + turned[..., None] * whole[..., 6:, :]
-        slopes[..., state:] += self._slopes_of(lambda moved: rates(steering, moved), values)
+        slopes[..., state:-1] += self._slopes_of(lambda moved: rates(steering, moved), values)
         steps = np.cumsum(0.5 * self._step * (slopes[:, 1:] + slopes[:, :-1]), axis=1)
         grown = np.zeros((*whole.shape[:2], state + n, whole.shape[-1] + n))
         grown[..., :state, :state], grown[..., :state, state + n :] = whole[..., :state], whole[..., state:]
@@ -192,7 +219,7 @@ class Shooting:
         width, joints = state.shape[1], torque.shape[1]
 
         def end(state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-            model = TorchModel(self.robot, parameters=self._parameters(values))
+            model = TorchModel(self.robot, parameters=self.parameters(values))
             both: Any = model.simulate(cast(Any, state), cast(Any, torque), self._step, 1)
             return cast(torch.Tensor, both[1])
 
@@ -236,7 +263,8 @@ class Shooting:
     def _named(self, values: Array) -> dict[str, float]:
         return {**self.known, **{name: float(values[i]) for i, name in enumerate(self.names)}}
 
-    def _parameters(self, values: Array | torch.Tensor) -> RobotParameters:
+    def parameters(self, values: Array | torch.Tensor) -> RobotParameters:
+        """The numbers of the robot with values (P,) of the unknowns, and what comes behind these left out."""
         named = {**self.known, **{name: values[i] for i, name in enumerate(self.names)}}
         replaced = {name: value for name, value in named.items() if kind_of(name) in PARAMETERS}
         return parameters_with(self.robot, replaced, self.dynamics)
