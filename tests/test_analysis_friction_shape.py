@@ -1,4 +1,4 @@
-"""caster_gym.analysis.friction_shape: shapes are what (F1) says, and factors are believed as far as data ask for it."""
+"""caster_gym.analysis.friction_shape: shapes are what (H1) says, and factors are believed as far as data ask for it."""
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ def test_slow_shapes_fade_out_and_fast_ones_begin_late():
 
 
 def test_means_over_a_step_are_those_of_an_integral():
+    """(H3)"""
     shapes = Shapes(ROBOT)
     factors = np.random.default_rng(0).normal(size=len(shapes.units))
     half = len(factors) // 2
@@ -60,7 +61,7 @@ def test_all_slow_shapes_together_push_as_dry_friction_that_is_sharper():
 
 @pytest.mark.parametrize(("true", "gains"), [((0.0, 0.0, 0.0, 0.0), False), ((0.3, 0.0, 0.0, 0.02), True)])
 def test_deviations_are_those_that_data_were_drawn_with(true, gains):
-    """Factors drawn from a normal distribution, measured with noise of one: found within the scatter of 40 draws."""
+    """(H2): factors drawn from a normal distribution, measured with noise of one: found within the scatter of 40 draws."""
     rng, groups = np.random.default_rng(3), np.repeat(np.arange(4), 40)
     columns = rng.normal(size=(4000, len(groups))) * 3.0
     factors = rng.normal(size=len(groups)) * np.array(true)[groups]

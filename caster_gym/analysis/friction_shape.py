@@ -4,7 +4,7 @@ The model's friction of a joint is viscous · ϑ + coulomb · ϑ / √(ϑ² + ϑ
 greater before it breaks away, or bent at high rates, and an estimate that rests on the law alone is then wrong by more
 than its interval. So a friction g(ϑ) is added to that of the rolling joints and to that of the steering joints:
 
-    g(ϑ) = Σ a_k p_k(ϑ),    s_ε(ϑ) = ϑ / √(ϑ² + ε²)                                                        (F1)
+    g(ϑ) = Σ a_k p_k(ϑ),    s_ε(ϑ) = ϑ / √(ϑ² + ε²)                                                        (H1)
 
     slow shapes    s_ε − s_ε' of neighbouring rates ε < ε', which fade out at rates beyond ε'
     fast shapes    s_ε of greater rates ε, which hardly begin below ε
@@ -90,7 +90,7 @@ class Shapes:
         edges = np.concatenate([self._slow, self._fast])
         a, b = before[..., None], after[..., None]
         # the integral of s_ε is √(ϑ² + ε²), whose difference over b − a is written without a division by zero
-        steps = (a + b) / (np.hypot(a, edges) + np.hypot(b, edges))
+        steps = (a + b) / (np.hypot(a, edges) + np.hypot(b, edges))  # (H3)
         slow = len(self._slow)
         return np.concatenate([steps[..., : slow - 1] - steps[..., 1:slow], steps[..., slow:]], axis=-1)
 
@@ -122,7 +122,7 @@ def likeliest_deviations(information: Array, pull: Array, groups: NDArray[np.int
         matrix = np.eye(len(groups)) + deviations[:, :, None] * information * deviations[:, None]
         along = deviations * pull
         solved = np.linalg.solve(matrix, along[..., None])[..., 0]
-        result: Array = 0.5 * (along * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(matrix)[1]
+        result: Array = 0.5 * (along * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(matrix)[1]  # (H2)
         return result
 
     def replaced(group: int, values: Array) -> Array:

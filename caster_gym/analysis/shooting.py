@@ -102,7 +102,7 @@ class Shooting:
         model, width = Model(self.robot, parameters=self.parameters(values)), self._state
         torque, fine = self._pushed_torque(values), self._step / FINER
         states = model.simulate(path[:, :-1, :width], torque, fine, FINER, checked=True)
-        errors = states[-1] - path[:, 1:, :width]
+        errors: Array = states[-1] - path[:, 1:, :width]
         angles = [2, *range(6, width)]
         errors[..., angles] = np.mod(errors[..., angles] + np.pi, 2.0 * np.pi) - np.pi
         if self._rolls:
