@@ -121,15 +121,17 @@ def read_rows(path: Path) -> list[Held]:
 
 def coverage_table(rows: list[Held]) -> str:
     """Shares of intervals that hold the truth, of those that are not warned of, a row for each law."""
-    names = list(TRUTH)
+    names, laws = list(TRUTH), list(dict.fromkeys(row.law for row in rows))
+    groups = [(law, [row for row in rows if row.law == law]) for law in laws]
+    if len(laws) > 2:
+        groups.append(("all but the first", [row for row in rows if row.law != laws[0]]))
     lines = []
-    for law in dict.fromkeys(row.law for row in rows):
-        own = [row for row in rows if row.law == law]
+    for title, own in groups:
         trusted = [row for row in own if not row.doubted]
-        count = len({row.recording for row in own})
-        warned = len({row.recording for row in own if row.doubted})
+        count = len({(row.law, row.recording) for row in own})
+        warned = len({(row.law, row.recording) for row in own if row.doubted})
         cells = [_share([row for row in trusted if row.name == name]) for name in names]
-        lines.append((law, str(count), str(warned), *cells, _share(trusted)))
+        lines.append((title, str(count), str(warned), *cells, _share(trusted)))
     return markdown_table(("friction", "recordings", "warned of", *names, "all"), lines)
 
 

@@ -61,7 +61,7 @@ def test_all_slow_shapes_together_push_as_dry_friction_that_is_sharper():
 
 @pytest.mark.parametrize(("true", "gains"), [((0.0, 0.0, 0.0, 0.0), False), ((0.3, 0.0, 0.0, 0.02), True)])
 def test_deviations_are_those_that_data_were_drawn_with(true, gains):
-    """(H2): factors drawn from a normal distribution, measured with noise of one: found within the scatter of 40 draws."""
+    """(H2): factors drawn from a normal distribution, measured with noise of one, are found within their scatter."""
     rng, groups = np.random.default_rng(3), np.repeat(np.arange(4), 40)
     columns = rng.normal(size=(4000, len(groups))) * 3.0
     factors = rng.normal(size=len(groups)) * np.array(true)[groups]
