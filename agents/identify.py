@@ -218,7 +218,7 @@ def page(found: "Identification", recording: Path) -> str:
         f"# What {recording.name} tells of {found.robot.name}",
         f"{shooting.count} windows of {seconds:.3g} s, each predicted by the simulator from an initial state of its "
         f"own; estimates of greatest likelihood, with {percent} intervals, after {found.steps} steps. Torques are "
-        "taken to be exact.",
+        "taken to be exact; friction may depart from the model's law as far as the recording asks for it.",
         markdown_table(("", "start", f"estimate, {percent}", "unit"), _estimate_rows(found)),
         *(f"**{sentence}**" for sentence in (*found.untold, *found.warnings)),
         *found.notes,

@@ -137,7 +137,7 @@ class TrailingStarts(EqualStarts):
         steering = np.array(first)[self.engine.paths]
         directions = np.stack([np.cos(steering), np.sin(steering)], axis=-1).reshape(self.num_envs, -1)
         states = self.engine.states
-        states[:, 7:] = directions
+        states[:, 7 : 7 + directions.shape[1]] = directions
         self.engine.states = states
         place = next(part.place for part in self.engine.layout.parts if part.name == "directions")
         observations[:, place] = directions

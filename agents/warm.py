@@ -43,9 +43,11 @@ class Warmed(NamedTuple):
 def read_pieces(robots: Sequence[str], tasks: Sequence[str], casters: Sequence[int]) -> list[Piece]:
     """All pieces that robots, tasks and other numbers of casters need; those that come with the package, without any.
 
+    Of these, tasks on a floor of finite friction, which take twice as long, only if they are named.
     Raises ValueError for a robot or a task that is not there or wrong, and for fewer than two casters.
     """
-    chosen = [read_settings(TaskSettings, "tasks", name) for name in tasks or _shipped("tasks")]
+    known = [read_settings(TaskSettings, "tasks", name) for name in tasks or _shipped("tasks")]
+    chosen = [one for one in known if tasks or one.task.slippery is None]
     named = [*robots] if robots or casters else [*_shipped("robots"), *(task.robot for task in chosen)]
     by_casters = {robot.caster_count: robot for robot in map(load_robot, named)}
     for count in casters:
@@ -82,10 +84,11 @@ def _shipped(kind: str) -> list[str]:
 
 def _of_task(robot: Robot, task: ChosenTask) -> list[Piece]:
     """The single environment and the batch of a task, with and without obstacles."""
+    floor = "" if task.task.slippery is None else " on a floor of finite friction"
     seen = f"{len(task.task.preview)} previewed points, {task.task.nearest} observed obstacles"
     return [
         Piece(
-            f"{robot.caster_count} casters, {task.environment}{words}, {seen}, {_how(count)}",
+            f"{robot.caster_count} casters, {task.environment}{words}{floor}, {seen}, {_how(count)}",
             partial(_step_task, robot, task, arena, count),
         )
         for words, arena in (("", None), (" among obstacles", _FAR))

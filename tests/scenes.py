@@ -61,6 +61,7 @@ def scene(x=1.0, y=0.0, turn=0.0, time=0.0, **changes):
         "impulse": np.zeros(2),
         "impact_point": np.full(2, np.nan),
         "failed": False,
+        "slip": np.zeros((n, 2)),
     }
     return Scene(**{**fields, **changes})
 

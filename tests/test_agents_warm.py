@@ -32,6 +32,12 @@ def test_what_comes_with_the_package_is_compiled_unless_something_is_named():
     ]
 
 
+def test_tasks_on_slippery_floors_are_compiled_if_they_are_named():
+    pieces = names(["chung2008"], ["track", "slippery_floor"], [])
+    assert len(set(pieces)) == 2 * 2 * 2 + 2
+    assert sum("on a floor of finite friction" in name for name in pieces) == 2 * 2
+
+
 def test_other_numbers_of_casters():
     assert {name.split(",")[0] for name in names([], ["track"], [2, 7])} == {"2 casters", "7 casters"}
     with pytest.raises(ValueError, match="2 casters or more, got 1"):

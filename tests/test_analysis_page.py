@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SECTIONS = "JLQNFUSR"
+SECTIONS = "JLQNFUSRH"
 TAG = re.compile(rf"\(([{SECTIONS}]\d+)\)")
 DERIVED = re.compile(rf"\*\*\(([{SECTIONS}]\d+)\)\*\*")
 LAWS = {"J7", "Q7", "Q9", "U7"}  # that nobody needs to compute

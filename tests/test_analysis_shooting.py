@@ -64,10 +64,12 @@ def test_the_robot_of_a_recording_predicts_it_and_turns_do_not_count():
     recording.pose[30:, 2] += 2.0 * np.pi
     recording.steering[20:, 1] -= 4.0 * np.pi
     shooting = Shooting(load_robot("chung2008"), recording, ("payload_mass",), {"payload_x": 0.02}, 0.3)
-    path = shooting.predict(shooting.first_guess(np.array([1.0])), np.array([1.0]))
-    assert_allclose(
-        shooting.errors(path, np.array([1.0])), 0.0, atol=1e-9
-    )  # rounding, grown a thousandfold by casters that flip
+    values = np.array([1.0])
+    path = shooting.predict(shooting.first_guess(values), values)
+    errors = shooting.errors(path, values)
+    *_, drift = shooting.derivatives_and_drift(path, values, shooting.step_errors(path, values))
+    assert np.abs(errors).max() > 1e-4  # of steps that are coarser than those of the recording
+    assert_allclose(errors + drift, 0.0, atol=1e-2 * np.abs(errors).max())  # their squares are left out
 
 
 def test_velocities_are_first_guessed_from_poses():

@@ -109,7 +109,7 @@ def test_a_push_on_a_robot_at_rest_is_held_by_the_floor(name):
 
 def test_drawn_forces_of_the_floor_hold_a_robot_that_leans_on_a_wall():
     """At rest against a wall, the forces on the wheels balance the wall's, within the creep of dry friction."""
-    robot = load_robot("chung2008")
+    robot = standing_high(load_robot("chung2008"), 0.0)  # loads as at rest
     env = CasterTrackEnv(robot, {"shape": "circle", "radius": 0.5}, arena=WALL, corridor=5.0)
     env.reset(seed=0, options={"pose": [0.6, 0.0, 0.0], "steering": [0.0] * 3})
     action = np.tile([0.4, 0.0], 3).astype(np.float32)  # rolls towards the wall

@@ -11,6 +11,7 @@ from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.envs import tracking
 from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.envs.tracking import Record, Reference, Situation
+from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
@@ -223,7 +224,9 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         reference = Reference(*map(float, m.reference))
         points = tuple(tuple(map(float, row[:7])) for row in m.coming)
         errors = tracking.tracking_errors(state, reference)
-        observation = tracking.observe(state, reference, errors, points, (), parameters)
+        observation = tracking.observe(
+            state, reference, errors, points, (), all_joint_rates(state, parameters, None), parameters
+        )
         assert_array_equal(np.array(observation, dtype=np.float32), m.observation)
         torques = pairs(tuple(map(float, m.info["torque"])))
         record = untouched(m.info["power"])

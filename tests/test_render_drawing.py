@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
+from caster_gym.floor import Floor, Patch
 from caster_gym.render import palette
 from caster_gym.render.viewer import Viewer
 from tests.scenes import centroid, obstacles, scene
@@ -91,6 +92,31 @@ def test_a_force_is_drawn_at_its_wheel_along_its_direction():
     along = centroid(frame, palette.FORCE) - wheel
     assert abs(along[0]) < ONE_PIXEL
     assert along[1] < -5.0  # up, which is left of ahead
+
+
+def test_a_wheel_that_slips_has_an_arrow_along_its_slip():
+    slip = np.zeros((3, 2))
+    slip[1] = (0.0, 0.3)  # to the left of the second wheel, which rolls ahead
+    frame, view = drawn(scene(0.0, 0.0, slip=slip), follow=0.6)
+    robot = scene().robot
+    wheel = view.pixels((robot.casters[1].x - robot.casters[1].trail, robot.casters[1].y))
+    along = centroid(frame, palette.SLIP) - wheel
+    assert abs(along[0]) < 2.0 * ONE_PIXEL  # its tread has the same colour, and the link hides some of that
+    assert along[1] < -5.0  # up, which is left of ahead
+    assert not (drawn(scene(0.0, 0.0), follow=0.6)[0] == palette.SLIP).all(axis=2).any()
+
+
+def test_a_patch_of_the_floor_is_where_it_is_and_tells_ice_from_rough_ground():
+    patches = [
+        Patch(x=0.3, y=0.2, radius=0.25, friction=0.1),
+        Patch(x=-0.6, y=0.5, radius=0.1, friction=0.9),
+    ]
+    frame, view = drawn(scene(5.0, 5.0, floor=Floor(friction=0.7, patches=patches)), follow=None)
+    for patch, colour in zip(patches, (palette.ICE, palette.ROUGH), strict=True):
+        rows, columns = np.nonzero((frame == colour).all(axis=2))
+        places = view.metres(np.stack([columns + 0.5, rows + 0.5], axis=1)) - (patch.x, patch.y)
+        reach = np.hypot(*places.T).max()
+        assert patch.radius - 4.0 / view.scale < reach <= patch.radius + 1.0 / view.scale  # within its edge
 
 
 def test_a_pillar_ends_where_its_radius_says():

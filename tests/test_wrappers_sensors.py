@@ -9,6 +9,7 @@ from caster_gym.configuration import ConfigurationError
 from caster_gym.envs import tracking
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.tracking import Reference, observe, tracking_errors
+from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.paths import build_trajectories
@@ -115,7 +116,9 @@ def test_an_observation_is_what_a_robot_at_the_measured_state_would_see():
         measured = np.concatenate((place, (c, s), layout.physical(shown, "twist")[robot], flat[7:]))
         state = unpack_state(tuple(measured.tolist()))
         errors = tracking_errors(state, reference)
-        expected = np.array(observe(state, reference, errors, points, (), robot_parameters(ROBOT)))
+        parameters = robot_parameters(ROBOT)
+        turning = all_joint_rates(state, parameters, None)
+        expected = np.array(observe(state, reference, errors, points, (), turning, parameters))
         rates = next(part.place for part in layout.parts if part.name == "joint_rates")
         seen = np.ones(layout.size, dtype=np.bool_)
         seen[rates] = False  # measured on their own

@@ -7,12 +7,15 @@ with the unknowns. See `caster_gym.analysis.shooting` and `caster_gym.analysis.w
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.analysis.recording import KIND_UNITS, Noise, Recording
+from caster_gym.analysis.friction_allowance import Allowance, allow_for_friction
+from caster_gym.analysis.friction_shape import JOINTS, Shapes
+from caster_gym.analysis.mends import listed
+from caster_gym.analysis.noise_levels import LEAST_NOISE, Agreement, Levels, agreements_of
+from caster_gym.analysis.recording import Noise, Recording
 from caster_gym.analysis.recording_check import check_recording
 from caster_gym.analysis.shooting import Shooting
 from caster_gym.analysis.unknowns import (
@@ -27,30 +30,19 @@ from caster_gym.analysis.unknowns import (
     robot_with,
     unknowns,
 )
-from caster_gym.analysis.window_fit import Fit, Normal, Told, fit, point_at
+from caster_gym.analysis.window_fit import Fit, fit
 from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
 
+_CLOSE = 100.0  # squared distance to the optimum, in standard deviations, from which the last part of a fit goes on
 _SHORT = 0.25  # [-] of a window, for a first fit that far starting values do not lead astray
-_LEAST_NOISE = 1e-9  # [m, rad, …] standard deviation below which rounding and time steps decide
-_EXACT = 1e-5  # [-] of a quantity's own variation: errors so small are those of time steps, not of a sensor
-_SURE = 4.0  # standard deviations beyond which chance no longer explains a misfit
 _ENTANGLED = 0.98  # [-] correlation from which two estimates are said to be entangled
+_SURE_GAIN = 3.0  # logarithm of a ratio of likelihoods; chance alone gives it in some 3 of 100 recordings
+_SMALL_FRICTION = 1e-4  # [-] of a motor's greatest torque: a departure so small is that of time steps
+_OF_FRICTION = ("roll_viscous", "roll_coulomb", "steer_viscous", "steer_coulomb", "scrub")  # rest on its law
 _PART = 0.1  # [-] share of a direction from which an unknown takes part in it
-
-
-class Agreement(NamedTuple):
-    """How the errors that are left compare with noise, for one kind of quantity."""
-
-    kind: str
-    unit: str
-    before: float  # root mean square error with the starting values, from the initial states of the estimates
-    left: float  # standard deviation of the errors that are left, for the freedom that was used
-    noise: float  # standard deviation of the noise: as given, else from one sample to the next
-    given: bool
-    explained: bool  # the errors are noise, or too small to be that of a sensor
 
 
 @dataclass(frozen=True)
@@ -67,6 +59,7 @@ class Identification:
     agreements: tuple[Agreement, ...]
     untold: tuple[str, ...]  # sentences: what the recording cannot tell
     warnings: tuple[str, ...]  # sentences: what the intervals do not cover
+    doubted: tuple[str, ...]  # names of unknowns whose intervals the warnings call into question
     notes: tuple[str, ...]  # sentences: small contradictions, and what is told apart only just
     shooting: Shooting
     before: Array  # (W, S, observed) predicted with the starting values, from the same initial states
@@ -100,7 +93,8 @@ def identify(
     Raises ValueError for names that are not known, a recording of another number of casters, a window that is not
     positive and a confidence that does not lie between 0 and 1.
     """
-    starts, width = dict(starts or {}), _quantile(confidence)
+    starts = dict(starts or {})
+    _quantile(confidence)  # refused now and not after the fit
     if not window > 0.0:
         raise ValueError(f"the window must be positive, got {window:g} s")
     lasts = recording.time_step * (len(recording.pose) - 1)
@@ -119,16 +113,21 @@ def identify(
     scales = np.array([one.scale for one in chosen])
     limits = np.array([one.bounds for one in chosen], dtype=np.float64)
     first = np.array([one.start for one in chosen])
-    levels = _Levels(recording, noise or Noise())
+    levels = Levels(recording, noise or Noise())
     short, shooting = (Shooting(robot, recording, names, starts, share * window, dynamics) for share in (_SHORT, 1.0))
     rough = fit(short, short.first_guess(first), first, scales, limits, levels.at_first, levels.update, np.inf, report)
     nearer = short.starts_on(shooting, rough.point.path)
-    found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, report=report)
-    untold = found.told.untold  # what is not told goes back to where it started, which the recording does not notice
-    values = found.point.values + scales * (untold @ (untold.T @ ((first - found.point.values) / scales)))
-    agreements = _agreements(found, shooting, levels, first)
-    deviations, correlations = _spread(found, scales, agreements)
-    half_widths = deviations * width
+    found = fit(shooting, nearer, rough.point.values, scales, limits, rough.sigma, levels.update, _CLOSE, report)
+    shapes = Shapes(robot)
+    allowed = allow_for_friction(shooting, shapes, found, scales, limits, levels.update, levels.kinds, report)
+    reached, untold = allowed.point.values, found.told.untold
+    # what is not told goes back to where it started, which the recording does not notice
+    values = reached + scales * (untold @ (untold.T @ ((first - reached) / scales)))
+    agreements = agreements_of(allowed, shooting, levels, first)
+    deviations, half_widths, correlations = _spread(found, allowed, scales, agreements, confidence)
+    friction, doubted = _friction_words(allowed, shapes, shooting, names)
+    if not all(one.explained for one in agreements):
+        doubted = list(names)
     return Identification(
         robot=robot_with(robot, {**starts, **dict(zip(names, map(float, values), strict=True))}),
         unknowns=chosen,
@@ -139,121 +138,50 @@ def identify(
         confidence=confidence,
         agreements=agreements,
         untold=tuple(_untold_words(found.told.untold, chosen)),
-        warnings=tuple(_warning_words(found, chosen, agreements, half_widths)),
+        warnings=(*_warning_words(found, allowed, chosen, agreements, half_widths), *friction),
+        doubted=tuple(doubted),
         notes=(*notes, *_entangled_words(correlations, chosen)),
         shooting=shooting,
-        before=shooting.at_samples(shooting.predict(found.point.starts, first), first),
-        after=shooting.at_samples(shooting.predict(found.point.starts, values), values),
-        steps=rough.steps + found.steps,
+        before=shooting.at_samples(shooting.predict(allowed.point.starts, first), first),
+        after=shooting.measured + allowed.point.errors,
+        steps=rough.steps + found.steps + allowed.looks,
     )
 
 
-class _Left(NamedTuple):
-    """Errors that a fit leaves in each kind of quantity, over the standard deviations it was weighted with."""
+def _spread(
+    found: Fit, allowed: Allowance, scales: Array, agreements: Sequence[Agreement], confidence: float
+) -> tuple[Array, Array, Array]:
+    """Standard deviations, half widths of intervals and correlations of the estimates.
 
-    variance: dict[str, float]  # for the freedom that was used
-    between: dict[str, float]  # the same from successive samples, in whose difference slow errors do not show
-    freedom: dict[str, float]
-
-
-class _Levels:
-    """Standard deviations of what a recording measured, given or estimated, one for each kind of quantity."""
-
-    def __init__(self, recording: Recording, given: Noise) -> None:
-        kinds = recording.kinds
-        self.kinds = [kinds[i] for i in recording.observed]
-        self.given = {kind: float(level) for kind, level in given if level is not None}
-        signals, angles = recording.measured.copy(), self.of("heading") | self.of("steering")
-        signals[:, angles] = np.unwrap(signals[:, angles], axis=0)
-        self.variation = {kind: float(signals[:, self.of(kind)].std(axis=0).max()) for kind in self.kinds}
-        # third differences: smooth motion adds little to them, white noise 20 times its variance
-        thirds = (np.diff(signals, 3, axis=0) ** 2).mean(axis=0) / 20.0
-        self.at_first = self._filled({kind: float(thirds[self.of(kind)].mean()) for kind in self.kinds})
-
-    def of(self, kind: str) -> NDArray[np.bool_]:
-        """Which observed components are of a kind."""
-        return np.array([own == kind for own in self.kinds])
-
-    def update(self, equations: Normal, known: Told, sigma: Array) -> Array:
-        """Standard deviations from the errors of a fit."""
-        left = self.left(equations, known).variance
-        weights = dict(zip(self.kinds, sigma, strict=True))
-        return self._filled({kind: left[kind] * weights[kind] ** 2 for kind in left})
-
-    def left(self, equations: Normal, known: Told) -> _Left:
-        """What a fit leaves. The fit bends errors towards zero along the columns of an orthonormal basis."""
-        windows, width = len(equations.errors), len(self.kinds)
-        shared = equations.across @ (known.directions / np.sqrt(known.strengths))
-        basis = np.concatenate([equations.q, shared], axis=2).reshape(
-            windows, -1, width, equations.q.shape[2] + shared.shape[2]
-        )
-        errors = equations.errors.reshape(windows, -1, width)
-        steps, bent = np.diff(errors, axis=1), np.diff(basis, axis=1)
-        found = _Left({}, {}, {})
-        for kind in dict.fromkeys(self.kinds):
-            of = self.of(kind)
-            free = errors[..., of].size - (basis[:, :, of] ** 2).sum()
-            found.freedom[kind] = float(free)
-            found.variance[kind] = float((errors[..., of] ** 2).sum() / free)
-            found.between[kind] = float(
-                (steps[..., of] ** 2).sum() / (2.0 * steps[..., of].size - (bent[:, :, of] ** 2).sum())
-            )
-        return found
-
-    def _filled(self, variances: Mapping[str, float]) -> Array:
-        levels = {kind: self.given.get(kind, variance**0.5) for kind, variance in variances.items()}
-        return np.array([max(levels[kind], _LEAST_NOISE) for kind in self.kinds])
-
-
-def _agreements(found: Fit, shooting: Shooting, levels: _Levels, first: Array) -> tuple[Agreement, ...]:
-    left = levels.left(found.normal, found.told)
-    before = point_at(shooting, found.point.starts, first).errors
-    agreements = []
-    for kind in left.variance:
-        of, given = levels.of(kind), kind in levels.given
-        sigma = float(found.sigma[of][0])
-        size = left.variance[kind] ** 0.5 * sigma
-        noise = sigma if given else left.between[kind] ** 0.5 * sigma
-        # variances of white noise scatter by 2/freedom; the logarithm of von Neumann's ratio by 1/freedom
-        excess = (
-            left.variance[kind] - 1.0
-            if given
-            else np.log(max(left.variance[kind], 1e-300) / max(left.between[kind], 1e-300))
-        )
-        chance = _SURE * ((2.0 if given else 1.0) / left.freedom[kind]) ** 0.5
-        explained = bool(excess < chance) or size < max(_EXACT * levels.variation[kind], _LEAST_NOISE)
-        rms = float(np.sqrt((before[..., of] ** 2).mean()))
-        agreements.append(Agreement(kind, KIND_UNITS[kind], rms, size, noise, given, explained))
-    return tuple(agreements)
-
-
-def _spread(found: Fit, scales: Array, agreements: Sequence[Agreement]) -> tuple[Array, Array]:
-    """Standard deviations and correlations of the estimates.
-
-    Where noise does not explain the errors, these count instead of it, and so does, if it is more, how far apart the
-    windows would have the estimates.
+    Where noise does not explain the errors, these count instead of it. Errors that vary slowly are worth fewer samples:
+    if the ratio of their variance to that between successive samples is r = 1 / (1 − ρ), as if each kept the share ρ of
+    the one before, (1 + ρ) / (1 − ρ) = 2 r − 1 times fewer. How far apart the windows would have the estimates counts
+    too, if it is more, and the intervals are then Student's for as many windows.
     """
-    directions, strengths = found.told.directions, found.told.strengths
-    covariance = directions / strengths @ directions.T
-    excess = max((one.left / one.noise for one in agreements if one.given and not one.explained), default=1.0)
-    variances = np.diag(covariance) * max(excess, 1.0) ** 2
-    if not all(one.explained for one in agreements):
-        pulls = covariance @ found.normal.gradients.T
-        windows = len(found.normal.gradients)
+    covariance = allowed.covariance
+    unexplained = [one for one in agreements if not one.explained]
+    ratios = [(one.left / max(one.noise, LEAST_NOISE)) ** 2 for one in unexplained]
+    slow = max((r if one.given else 2.0 * r - 1.0 for one, r in zip(unexplained, ratios, strict=True)), default=1.0)
+    variances, width = np.diag(covariance) * max(slow, 1.0), _quantile(confidence)
+    if unexplained:
+        pulls = allowed.spread @ allowed.normal.gradients.T
+        windows = pulls.shape[1]
         variances = np.maximum(variances, (pulls**2).sum(axis=1) * windows / max(windows - 1, 1))
+        width = _quantile(confidence, max(windows - 1, 1))
     known = ((found.told.untold**2).sum(axis=1) < _PART**2) & ~found.at_bounds
     deviations = np.where(known, scales * np.sqrt(variances), np.inf)
     own = np.sqrt(np.where(known, np.diag(covariance), np.nan))
-    return deviations, covariance / np.outer(own, own)
+    return deviations, deviations * width, covariance / np.outer(own, own)
 
 
-def _quantile(confidence: float) -> float:
-    """Half width of an interval in standard deviations."""
-    from scipy.stats import norm
+def _quantile(confidence: float, freedom: int | None = None) -> float:
+    """Half width of an interval in standard deviations: a normal quantile, or Student's of some freedom."""
+    from scipy.stats import norm, t
 
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"the confidence must lie between 0 and 1, got {confidence:g}")
-    return float(norm.ppf(0.5 + 0.5 * confidence))
+    share = 0.5 + 0.5 * confidence
+    return float(norm.ppf(share) if freedom is None else t.ppf(share, freedom))
 
 
 def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
@@ -294,13 +222,37 @@ def _entangled_words(correlations: Array, chosen: Sequence[Unknown]) -> list[str
     return sentences
 
 
+def _friction_words(
+    allowed: Allowance, shapes: Shapes, shooting: Shooting, names: Sequence[str]
+) -> tuple[list[str], list[str]]:
+    """A sentence if friction surely departs from the law, and the names of what rests on the law.
+
+    Those are of all joints: where the law is wrong in some, a part that shows less may hide in the others' numbers.
+    """
+    parts = []
+    for joint, (kind, rates) in enumerate(zip(JOINTS, shapes.rates(shooting, allowed.point), strict=True)):
+        extra = shapes.torque(joint, rates, allowed.factors)
+        worst = int(np.abs(extra).argmax())
+        small = abs(extra[worst]) < _SMALL_FRICTION * shapes.greatest[joint]
+        if small or allowed.believed.gains[2 * joint : 2 * joint + 2].max() < _SURE_GAIN:
+            continue
+        more = "greater" if extra[worst] > 0.0 else "less"
+        parts.append(f"in the {kind} joints it is {abs(extra[worst]):.2g} N m {more} at {rates[worst]:.2g} rad/s")
+    if not parts:
+        return [], []
+    own = [name for name in names if kind_of(name) in _OF_FRICTION]
+    rest = "The other estimates and their intervals allow for that" if own else "Estimates and intervals allow for that"
+    trusted = f", but {listed(own)} {'is' if len(own) == 1 else 'are'} not to be trusted" if own else ""
+    return [f"Friction does not follow the model's law: {listed(parts)}. {rest}{trusted}."], own
+
+
 def _warning_words(
-    found: Fit, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
+    found: Fit, allowed: Allowance, chosen: Sequence[Unknown], agreements: Sequence[Agreement], half_widths: Array
 ) -> list[str]:
-    sentences = []
-    if not found.converged:
-        sentences.append(f"The fit did not settle within {found.steps} steps; the numbers are where it stopped.")
-    for one, value, at_bound in zip(chosen, found.point.values, found.at_bounds, strict=True):
+    sentences, steps, point = [], found.steps + allowed.looks, allowed.point
+    if not (found.converged and allowed.settled):
+        sentences.append(f"The fit did not settle within {steps} steps; the numbers are where it stopped.")
+    for one, value, at_bound in zip(chosen, point.values, found.at_bounds, strict=True):
         if at_bound:
             sentences.append(
                 f"{one.name} went to its bound of {value:.4g} {one.unit}; beyond it the fit would be better."
@@ -313,10 +265,10 @@ def _warning_words(
     if unexplained:
         sentences.append(
             f"The model does not explain the recording: more errors are left than noise in {', '.join(unexplained)}. "
-            "Something that is not among the unknowns differs. The intervals are widened by how much the windows "
-            "disagree, but may still be too narrow."
+            "Something that is not among the unknowns differs. The intervals are widened, by how slowly errors vary "
+            "and by how much the windows disagree, but no estimate is to be trusted to within its interval."
         )
-    for one, value, half in zip(chosen, found.point.values, half_widths, strict=True):
+    for one, value, half in zip(chosen, point.values, half_widths, strict=True):
         if value + 2.0 * half < 0.0 and kind_of(one.name) not in SIGNED:
             sentences.append(f"{one.name} comes out negative, which no robot has: the model misses something else.")
     return sentences

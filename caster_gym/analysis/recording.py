@@ -120,7 +120,7 @@ def record(
     drag = force * lengths / (_CRUISE * robot.top_speed)
     phases = rng.uniform(-np.pi, np.pi, (len(_FREQUENCIES), 3))
     frequencies = _FREQUENCIES[:, None] * rng.uniform(0.8, 1.25, phases.shape)
-    count, substeps = round(seconds / time_step) + 1, substeps_of(robot, time_step)
+    count, substeps = round(seconds / time_step) + 1, FINER * substeps_of(robot, time_step)
     state = np.concatenate([np.zeros(6), rng.uniform(-np.pi, np.pi, robot.caster_count)])
     states, torques, rolled = [], [], [np.zeros(robot.caster_count)]
     for k in range(count):
@@ -141,6 +141,9 @@ def record(
 
 _FREQUENCIES = np.array([0.2, 0.5, 1.1, 2.3])  # [Hz]
 _CRUISE = 0.25  # [-] of the top speed at which the drag equals the amplitude of each sine
+
+
+FINER = 4  # times more steps than follow a robot, which pass over the rates at which dry friction changes its sign
 
 
 def substeps_of(robot: Robot, time_step: float) -> int:

@@ -12,6 +12,7 @@ The derivatives are those of the simulator's steps, by forward differentiation w
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any, cast
 
 import numpy as np
@@ -19,7 +20,7 @@ import torch
 from numpy.typing import NDArray
 
 from caster_gym.analysis.acting import acting_torque, acts, shown_errors
-from caster_gym.analysis.recording import Recording, substeps_of
+from caster_gym.analysis.recording import FINER, Recording, substeps_of
 from caster_gym.analysis.rolling import rolled_along
 from caster_gym.analysis.unknowns import PARAMETERS, kind_of, parameters_with
 from caster_gym.engines.numpy_model import Model
@@ -63,6 +64,16 @@ class Shooting:
         self._rolls = recording.rolling is not None
         self._plain = self._torque({}) if not acts({**known, **dict.fromkeys(names, 0.0)}) else None
         self._angle = np.isin(np.array(recording.kinds)[self.observed], ("heading", "steering"))
+        self._pushes = np.zeros((self.count, self._substeps * (self.length - 1), 2 * robot.caster_count, 0))
+
+    def with_pushes(self, pushes: Array) -> "Shooting":
+        """The same with K more values behind those of the unknowns, each a factor of further torques.
+
+        pushes (W, k (S − 1), 2 N, K): torques that act at the joints over each step, for factors of one. [N m]
+        """
+        wider = copy(self)
+        wider._pushes = pushes
+        return wider
 
     def first_guess(self, values: Array) -> Array:
         """Starts as measured; where velocities were not, from a parabola through the poses nearby."""
@@ -73,8 +84,8 @@ class Shooting:
 
     def predict(self, starts: Array, values: Array) -> Array:
         """The predicted path; not finite where the simulation ran away."""
-        model = Model(self.robot, parameters=self._parameters(values))
-        torque = self._torque(self._named(values)).swapaxes(0, 1)
+        model = Model(self.robot, parameters=self.parameters(values))
+        torque = self._pushed_torque(values).swapaxes(0, 1)
         with np.errstate(all="ignore"):
             path = model.simulate(starts[:, : self._state], torque, self._step, len(torque), checked=True)
         if self._rolls:
@@ -82,6 +93,22 @@ class Shooting:
             rolled = np.full_like(path[..., 6:], np.nan) if wild else rolled_along(model, path, torque, self._step)
             path = np.concatenate([path, starts[:, self._state :] + rolled], axis=-1)
         return path.swapaxes(0, 1)
+
+    def step_errors(self, path: Array, values: Array) -> Array:
+        """By how much FINER times as many steps end elsewhere than each step of a path (W, k (S − 1), of a state).
+
+        All steps are gone through side by side, so that this takes less time than a prediction.
+        """
+        model, width = Model(self.robot, parameters=self.parameters(values)), self._state
+        torque, fine = self._pushed_torque(values), self._step / FINER
+        states = model.simulate(path[:, :-1, :width], torque, fine, FINER, checked=True)
+        errors: Array = states[-1] - path[:, 1:, :width]
+        angles = [2, *range(6, width)]
+        errors[..., angles] = np.mod(errors[..., angles] + np.pi, 2.0 * np.pi) - np.pi
+        if self._rolls:
+            rolled = rolled_along(model, states, torque, fine)[-1]
+            errors = np.concatenate([errors, rolled - np.diff(path[..., width:], axis=1)], axis=-1)
+        return errors
 
     def starts_on(self, coarser: "Shooting", path: Array) -> Array:
         """Starts of another cut of the recording, from a path of this one."""
@@ -100,23 +127,34 @@ class Shooting:
         return np.where(self._angle, turned, errors)
 
     def derivatives(self, path: Array, values: Array) -> tuple[Array, Array]:
-        """Derivatives of what is observed with respect to starts (W, S, observed, 6 + N) and values (…, P)."""
+        """Derivatives of what is observed with respect to starts (W, S, observed, 6 + N) and values (…, P + K)."""
+        of_starts, of_values, _ = self.derivatives_and_drift(path, values, None)
+        return of_starts, of_values
+
+    def derivatives_and_drift(
+        self, path: Array, values: Array, step_errors: Array | None
+    ) -> tuple[Array, Array, Array]:
+        """Derivatives, and what errors of the steps add up to in what is observed (W, S, observed), to first order."""
         slopes = self._step_derivatives(path[:, :-1, : self._state], values)
         width, count = self._state, len(values)
-        here = np.zeros((self.count, width, width + count))
+        here = np.zeros((self.count, width, width + count + 1))
         here[..., :width] = np.eye(width)
         chained = [here]
         for k in range(slopes.shape[1]):
             here = slopes[:, k, :, :width] @ here
-            here[..., width:] += slopes[:, k, :, width:]
+            here[..., width:-1] += slopes[:, k, :, width:]
+            if step_errors is not None:
+                here[..., -1] += step_errors[:, k, :width]
             chained.append(here)
         whole = np.stack(chained, axis=1)
         if self._rolls:
             whole = self._with_rolling(path, values, whole)
-            width = whole.shape[-1] - count
+            width = whole.shape[-1] - count - 1
+            if step_errors is not None:
+                whole[:, 1:, self._state :, -1] += np.cumsum(step_errors[..., self._state :], axis=1)
         observed = whole[:, :: self._substeps][:, :, self.observed]
         errors = self._slopes_of(lambda moved: self._shown_errors(moved)[self.observed], values)
-        return observed[..., :width], observed[..., width:] + errors
+        return observed[..., :width], observed[..., width:-1] + errors, observed[..., -1]
 
     def _with_rolling(self, path: Array, values: Array, whole: Array) -> Array:
         """Derivatives of states and of the wheels' angles, from those of states (W, …, 6 + N, 6 + N + P)."""
@@ -124,12 +162,12 @@ class Shooting:
         twist, steering = path[..., 3:6], path[..., 6:state]
 
         def rates(steering: Array, values: Array) -> Array:
-            return Model(self.robot, parameters=self._parameters(values)).rates(steering, twist)[1]
+            return Model(self.robot, parameters=self.parameters(values)).rates(steering, twist)[1]
 
-        model = Model(self.robot, parameters=self._parameters(values))
+        model = Model(self.robot, parameters=self.parameters(values))
         turned = (rates(steering + _ASIDE, values) - rates(steering - _ASIDE, values)) / (2.0 * _ASIDE)
         slopes = model.jacobian(steering)[..., ::2, :] @ whole[..., 3:6, :] + turned[..., None] * whole[..., 6:, :]
-        slopes[..., state:] += self._slopes_of(lambda moved: rates(steering, moved), values)
+        slopes[..., state:-1] += self._slopes_of(lambda moved: rates(steering, moved), values)
         steps = np.cumsum(0.5 * self._step * (slopes[:, 1:] + slopes[:, :-1]), axis=1)
         grown = np.zeros((*whole.shape[:2], state + n, whole.shape[-1] + n))
         grown[..., :state, :state], grown[..., :state, state + n :] = whole[..., :state], whole[..., state:]
@@ -140,53 +178,76 @@ class Shooting:
     def _slopes_of(self, function: Callable[[Array], Array], values: Array) -> Array:
         """Derivatives (…, P) of a function of the values, by differences."""
         slopes = []
-        for i, (name, value) in enumerate(zip(self.names, values, strict=True)):
+        for i, (name, value) in enumerate(zip(self.names, values[: len(self.names)], strict=True)):
             aside = _ASIDE * (abs(value) or 1.0)
             low, high = values.copy(), values.copy()
             low[i], high[i] = value - aside, value + aside
             if name == "motor_lag":
                 low[i] = max(low[i], 0.0)
             slopes.append((function(high) - function(low)) / (high[i] - low[i]))
-        return np.stack(slopes, axis=-1)
+        rest = [np.zeros_like(slopes[0])] * (len(values) - len(slopes))
+        return np.stack([*slopes, *rest], axis=-1)
 
     def _step_derivatives(self, states: Array, values: Array) -> Array:
-        """Derivatives (W, k (S − 1), 6 + N, 6 + N + P) of each step's end with respect to its start and the values."""
-        width, count = states.shape[-1], len(values)
-        flat = torch.as_tensor(states.reshape(-1, width))
+        """Derivatives (W, k (S − 1), 6 + N, 6 + N + P + K) of each step's end with respect to its start and values."""
+        width, own = states.shape[-1], len(self.names)
         joints = 2 * self.robot.caster_count
-        torques = torch.as_tensor(self._torque(self._named(values)).reshape(-1, joints))
-        pushed = torch.zeros((len(flat), joints, count), dtype=torch.float64)
-        if self._plain is None:
-            moved = self._slopes_of(lambda values: self._torque(self._named(values)), values)
-            pushed = torch.as_tensor(moved.reshape(-1, joints, count))
-        seeds = torch.eye(width + count, dtype=torch.float64)
+        pushed = self._torque_slopes(values)  # (W, k (S − 1), 2 N, P + K)
+        seen = joints if pushed is not None else 0
+        seeds = torch.eye(width + own + seen, dtype=torch.float64)
+        flat = torch.as_tensor(states.reshape(-1, width))
+        torques = torch.as_tensor(self._pushed_torque(values).reshape(-1, joints))
         lanes = max(1, _TOGETHER // len(seeds))
         parts = [
-            self._tangents(state, torque, push, torch.as_tensor(values), seeds)
-            for state, torque, push in zip(*(torch.split(one, lanes) for one in (flat, torques, pushed)), strict=True)
+            self._tangents(state, torque, torch.as_tensor(values), seeds)
+            for state, torque in zip(torch.split(flat, lanes), torch.split(torques, lanes), strict=True)
         ]
-        slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy()
-        return slopes.reshape(*states.shape, width + count)
+        slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy().reshape(*states.shape, len(seeds))
+        if pushed is None:
+            return slopes
+        whole = np.concatenate([slopes[..., : width + own], np.zeros((*states.shape, len(values) - own))], axis=-1)
+        whole[..., width:] += slopes[..., width + own :] @ pushed
+        return whole
 
     def _tangents(
-        self, state: torch.Tensor, torque: torch.Tensor, pushed: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
+        self, state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
     ) -> torch.Tensor:
-        """How one step's ends (L, 6 + N) change along each of some directions of state and values, one a seed.
+        """How one step's ends (L, 6 + N) change along each of some directions of state, values and torque, one a seed.
 
-        pushed (L, 2 N, P): how the torques change with the values.
+        Seeds (…, 6 + N + P), or (…, 6 + N + P + 2 N) where torques change too.
         """
+        width, joints = state.shape[1], torque.shape[1]
 
         def end(state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-            model = TorchModel(self.robot, parameters=self._parameters(values))
+            model = TorchModel(self.robot, parameters=self.parameters(values))
             both: Any = model.simulate(cast(Any, state), cast(Any, torque), self._step, 1)
             return cast(torch.Tensor, both[1])
 
+        own = values[: len(self.names)]
+        places = [width, len(own), seeds.shape[1] - width - len(own)]
+
         def along(seed: torch.Tensor) -> torch.Tensor:
-            of_state, of_values = seed[: state.shape[1]].expand_as(state), seed[state.shape[1] :]
-            tangents = (of_state, pushed @ of_values, of_values)
-            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, values), tangents)[1])
+            of_state, of_values, of_torque = torch.split(seed, places)
+            if not len(of_torque):
+                of_torque = torch.zeros(joints, dtype=torch.float64)
+            tangents = (of_state.expand_as(state), of_torque.expand_as(torque), of_values)
+            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, own), tangents)[1])
 
         return torch.vmap(along)(seeds)
+
+    def _torque_slopes(self, values: Array) -> Array | None:
+        """Derivatives (W, k (S − 1), 2 N, P + K) of the torques with respect to the values; none if they are fixed."""
+        if self._plain is not None and not self._pushes.shape[-1]:
+            return None
+        moved = np.zeros((*self._pushes.shape[:-1], len(self.names)))
+        if self._plain is None:
+            moved = self._slopes_of(lambda values: self._torque(self._named(values)), values[: len(self.names)])
+        return np.concatenate([moved, self._pushes], axis=-1)
+
+    def _pushed_torque(self, values: Array) -> Array:
+        """Torques (W, k (S − 1), 2 N) that act over each step, with what pushes besides."""
+        torque, further = self._torque(self._named(values)), values[len(self.names) :]
+        return torque + self._pushes @ further if len(further) else torque
 
     def _torque(self, values: Mapping[str, float]) -> Array:
         """Torques (W, k (S − 1), 2 N) that act over each step."""
@@ -202,7 +263,8 @@ class Shooting:
     def _named(self, values: Array) -> dict[str, float]:
         return {**self.known, **{name: float(values[i]) for i, name in enumerate(self.names)}}
 
-    def _parameters(self, values: Array | torch.Tensor) -> RobotParameters:
+    def parameters(self, values: Array | torch.Tensor) -> RobotParameters:
+        """The numbers of the robot with values (P,) of the unknowns, and what comes behind these left out."""
         named = {**self.known, **{name: values[i] for i, name in enumerate(self.names)}}
         replaced = {name: value for name, value in named.items() if kind_of(name) in PARAMETERS}
         return parameters_with(self.robot, replaced, self.dynamics)

@@ -98,7 +98,7 @@ def _refusal(what: str, row: Array, time_step: float, substeps: int | None) -> s
     reason, field = _reason(row, binding, float(needed.max()))
     whom = f"the casters of {what}" if binding == "turning" else what
     said = f"a time step of {time_step:g} s cannot follow {whom}: {reason}; it must be positive and at most "
-    said += f"{_rounded_down(longest)} s"
+    said += f"{rounded_down(longest)} s"
     if substeps is None or not time_step > 0.0:
         return said
     count = substeps_for(time_step * substeps, longest)
@@ -122,7 +122,7 @@ def _enough(row: Array, field: str, time_step: float) -> str | None:
     robot = unpack_parameters(tuple(row[0].tolist()))
     most = max(getattr(caster, field) for caster in robot.casters)
     for power in range(1, 17):
-        bound = _rounded_down(most * 10.0 ** (-0.5 * power))
+        bound = rounded_down(most * 10.0 ** (-0.5 * power))
         less = tuple(caster._replace(**{field: min(getattr(caster, field), float(bound))}) for caster in robot.casters)
         if follows(time_step, float(longest_of_rows(np.array([pack_parameters(robot._replace(casters=less))]))[0])):
             return bound
@@ -164,7 +164,7 @@ def _round(value: float) -> str:
     return f"{digit * unit:g}"
 
 
-def _rounded_down(value: float) -> str:
+def rounded_down(value: float) -> str:
     """Three digits of a positive number that are no more than it."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
     return f"{math.floor(value / unit * (1.0 + _ROUNDING)) * unit:.3g}"

@@ -7,12 +7,15 @@ import torch
 from torch import Tensor
 
 import caster_gym.engines.torch_scalars  # noqa: F401 - makes tensors scalars of the mechanics
+from caster_gym.floor import Floor
+from caster_gym.mechanics.floor import FloorTable, Surface, floor_table, wheel_frictions
 from caster_gym.mechanics.ground import floor_use
 from caster_gym.mechanics.integration import State, derivative, pack_state, unit, unpack_state
 from caster_gym.mechanics.motors import joint_torques, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
-from caster_gym.mechanics.plant import all_motor_speeds, power_between
+from caster_gym.mechanics.plant import all_motor_speeds, driven_step, power_between, slip_speeds
 from caster_gym.mechanics.scalars import each, flatten, pairs
+from caster_gym.mechanics.slip import unpack_slip_state
 
 
 def driven_rows(
@@ -32,6 +35,42 @@ def driven_rows(
     states, done = _arrived(bodies, end, torques, robot)
     asks = _asked(bodies, forces, robot) if asking else torch.zeros_like(bodies[:2])
     return states, done, asks
+
+
+def slipping_rows(
+    bodies: Tensor, commands: Tensor, push: Tensor, h: float, frictions: Tensor, robot: RobotParameters
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """The same of wheels that may slip, on a floor of a friction under each (N, robots); then slips (N, robots) [m/s].
+
+    Rows of these states go on with yaw rate over ground and rolling rate of each caster, and the tilt.
+    """
+    states, done, asks, slips = _slipped(bodies, torch.cat((commands, push, frictions)), h, robot)
+    return states, done, asks, slips
+
+
+def torch_floor(floor: Floor) -> FloorTable:
+    """A floor whose patches are plain numbers, which the compiler folds."""
+    table = floor_table(floor)
+    return table._replace(patches=None if table.patches is None else table.patches.tolist())
+
+
+def surface_below(state: State, robot: RobotParameters, floor: FloorTable) -> Surface:
+    """The floor under each robot, whose frictions are tensors (robots,)."""
+    friction = robot.platform.floor_friction + 0.0 * state.position[0]  # Torch chooses between numbers in float32
+    on_it = robot._replace(platform=robot.platform._replace(floor_friction=friction))
+    frictions = wheel_frictions(state.position, state.heading, state.directions, floor.patches, on_it)
+    return Surface(frictions, floor.contact_time)
+
+
+@torch.compiler.nested_compile_region
+def _slipped(bodies: Tensor, given: Tensor, h: float, robot: RobotParameters) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    n = len(robot.casters)
+    rows = given.unbind(0)
+    x, y, z = rows[2 * n : 2 * n + 3]
+    surface = Surface(rows[2 * n + 3 :], 0.0)  # without an impact, no contact time
+    end, drive = driven_step(unpack_slip_state(bodies.unbind(0)), pairs(rows[: 2 * n]), (x, y, z), h, robot, surface)
+    done = torch.stack((*flatten(drive.torques), drive.power))
+    return torch.stack(pack_state(end)), done, torch.stack(tuple(drive.asks)), torch.stack(slip_speeds(end, robot))
 
 
 @torch.compiler.nested_compile_region

@@ -2,11 +2,11 @@
 
 Rows of a block, which is kept from step to step: state, room, wrench, progress. On a desk, which stays in the
 processor's cache, one block after the other is worked out; behind the rows of the block it has the robots' parameters,
-motor commands, mean motor torques, record, reference, preview, situation, nearest obstacles, observation, report. (Two
-arrays instead of one desk would stop the compiler from making SIMD loops.) Robots that are all alike share the
-parameters of one block, which then stay on the desk; a robot alone lives on its desk. The tuples in `Sizes` have an
-item per caster, per previewed point and per observed obstacle: their lengths are part of their types, so that all rows
-are constants of the compiled code.
+motor commands, mean motor torques, record, slip, friction of the floor, reference, preview, situation, nearest
+obstacles, observation, report. (Two arrays instead of one desk would stop the compiler from making SIMD loops.) Robots
+that are all alike share the parameters of one block, which then stay on the desk; a robot alone lives on its desk. The
+tuples in `Sizes` have an item per caster, per previewed point, per observed obstacle and per wheel that may slip: their
+lengths are part of their types, so that all rows are constants of the compiled code.
 """
 
 from typing import Any, NamedTuple
@@ -41,6 +41,7 @@ class World(NamedTuple):
     hull: Any  # Hull; this and the next two are None where there is no obstacle
     obstacles: Any  # Obstacles
     arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
+    floor: Any  # FloorTable; None where wheels roll without slip
     substeps: Any
     time_step: Any  # [s]
 
@@ -54,17 +55,24 @@ class Views(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """As many items as there are casters, previewed points, and obstacles in an observation."""
+    """As many items as there are casters, previewed points, obstacles in an observation, and wheels that may slip."""
 
     casters: tuple[int, ...]
     preview: tuple[int, ...]
     nearest: tuple[int, ...]
+    slipping: tuple[int, ...]  # empty where wheels roll without slip, else as long as casters
+
+
+def state_rows(casters: int, slips: bool) -> int:
+    """Numbers of the state of a robot with so many casters, whose wheels may slip or not."""
+    return BODY_ROWS + 2 * casters + (2 * casters + 2 if slips else 0)
 
 
 @register_jitable(**INLINE)
 def room_row(sizes: Sizes) -> int:
     """Row of the room, see `caster_gym.engines.guarding`."""
-    return BODY_ROWS + 2 * len(sizes.casters)
+    free = len(sizes.slipping)
+    return BODY_ROWS + 2 * len(sizes.casters) + (2 * free + 2 if free > 0 else 0)
 
 
 @register_jitable(**INLINE)
@@ -110,9 +118,21 @@ def record_row(sizes: Sizes) -> int:
 
 
 @register_jitable(**INLINE)
+def slip_row(sizes: Sizes) -> int:
+    """First row of the greatest slip of each wheel in the control period [m/s]."""
+    return record_row(sizes) + RECORD_ROWS
+
+
+@register_jitable(**INLINE)
+def friction_row(sizes: Sizes) -> int:
+    """First row of the floor's friction under each wheel."""
+    return slip_row(sizes) + len(sizes.slipping)
+
+
+@register_jitable(**INLINE)
 def reference_row(sizes: Sizes) -> int:
     """First row of the reference, with the previewed points behind it."""
-    return record_row(sizes) + RECORD_ROWS
+    return friction_row(sizes) + len(sizes.slipping)
 
 
 @register_jitable(**INLINE)
@@ -143,4 +163,4 @@ def report_row(sizes: Sizes) -> int:
 @register_jitable(**INLINE)
 def desk_rows(sizes: Sizes) -> int:
     """Rows of a desk."""
-    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters)
+    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters) + len(sizes.slipping)

@@ -35,7 +35,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.path_descriptions = engine.plan.descriptions  # what was made of each path of the pool
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
-        self._action_shape, self._terms = self.action_space.shape, engine.plan.terms
+        self._action_shape, self._terms, self._slipping = self.action_space.shape, engine.plan.terms, engine.slipping
         self.render_mode = checked_mode(render_mode, self.metadata)
         self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
         self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
@@ -70,7 +70,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         observation, reward, terminated, truncated, report = self.engine.step_alone(action)
         if self.render_mode == "human":
             self.render()
-        return observation, reward, terminated, truncated, named(report, self._terms)
+        return observation, reward, terminated, truncated, named(report, self._terms, self._slipping)
 
     def __copy__(self) -> Self:
         """As independent as a deep copy: two environments around one engine would move the same robot."""

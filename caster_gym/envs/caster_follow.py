@@ -40,6 +40,8 @@ class CasterFollowEnv(CasterEnv):
     **Impacts** as for `CasterTrackEnv`: where `impact_traction` is above 1 the floor cannot hold the wheels, and the
     true impulse is smaller than the one here.
 
+    **Floor** as for `CasterTrackEnv`.
+
     **Info** as for `CasterTrackEnv`; progress [m] is s, progress_share is σ, position_error the distance to the path.
 
     **Endings** `terminated`: the robot left its corridor (0.25 m from the path), its state stopped being finite, or it

@@ -55,6 +55,7 @@ class CasterTrackEnv(CasterEnv):
     | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
     | power | mean mechanical power of all motors over the control period | W |
     | traction_use | greatest share of the floor's friction that a wheel uses in the period; above 1 it would slip | – |
+    | wheel_slip | greatest speed of each wheel over the floor; only there where wheels may slip, see Floor | m/s |
     | wheels_lifted | most wheels at once that a push, an acceleration or a load lifts off the floor | – |
     | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |
     | pose, reference_pose | x, y, cos β, sin β in W | m, – |
@@ -67,14 +68,21 @@ class CasterTrackEnv(CasterEnv):
     | left_corridor, not_finite, touched | why an episode has terminated | bool |
 
     **Impacts** act through the whole inertia, as if the floor could keep the wheels from slipping whatever that takes.
-    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller. Head-on into a smooth wall at 0.5 m/s
-    with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
+    Where `impact_traction` is above 1 it cannot, and the true impulse is smaller, which `floor` takes in. Head-on into
+    a smooth wall at 0.5 m/s with restitution 0.5, medians over steering angles (docs/truth/impacts.md):
 
     | robot | impact_traction | impulse here | MuJoCo's, whose wheels slip | sideways here | MuJoCo's |
     |---|---|---|---|---|---|
     | chung2008 | 1.0 | 4.7 N s | 4.7 N s | 0.05 m/s | 0.05 m/s |
     | xr4000 | 8.0 | 67 N s | 53 N s | 0.06 m/s | 0.02 m/s |
     | tidybot2 | 36 | 120 N s | 50 N s | 0.18 m/s | 0.03 m/s |
+
+    **Floor** By default, `floor="grip"`, wheels roll without slip whatever they need. With a mapping such as
+    `floor={"friction": 0.3, "patches": [{"x": 1.0, "y": 0.0, "radius": 0.4, "friction": 0.05}]}` each wheel slips once
+    it needs more than friction times load, in driving and in impacts: traction_use is at most 1, and 1 where a wheel
+    slips. Without `friction` that of the robot counts, which the feature `friction` draws anew in each episode. Patches
+    are discs in W with a friction of their own, whatever is around them. Joint rates are those of the wheels, as
+    encoders show them, and no more those of rolling; observations have the same layout on every floor. A start rolls.
 
     **Endings** `terminated`: the robot left its corridor (0.5 m from the reference), its state stopped being finite,
     or it touched an obstacle and `touching` is "ends"; info tells which, and all terms of that step are 0. `truncated`:

@@ -29,6 +29,7 @@ def _words(world: Any, sizes: Any, how: str) -> str:
     around = " among obstacles" if _among_obstacles(world) else ""
     nearest = _count(sizes, "nearest")
     seen = f", {_several(nearest, 'observed obstacle')}" if nearest else ""
+    around += " on a floor of finite friction" if _count(sizes, "slipping") else ""
     previewed = _several(_count(sizes, "preview"), "previewed point")
     return f"{_count(sizes, 'casters')} casters ({task}{around}, {previewed}{seen}{how})"
 
@@ -39,7 +40,8 @@ def _several(count: int, noun: str) -> str:
 
 def _seconds(world: Any, sizes: Any, share: float) -> float:
     """A rule for what was measured with 2 to 4 casters."""
-    return share * (1.6 if _among_obstacles(world) else 1.0) * (10.0 + 4.0 * _count(sizes, "casters"))
+    slips = 2.0 if _count(sizes, "slipping") else 1.0
+    return share * slips * (1.6 if _among_obstacles(world) else 1.0) * (10.0 + 4.0 * _count(sizes, "casters"))
 
 
 def _among_obstacles(world: Any) -> bool:

@@ -21,42 +21,52 @@ from caster_gym.envs.block_layout import (
 )
 from caster_gym.envs.tracking import ASKS, IMPACT_TRACTION
 
-_TERMS = slice(FIRST_TERM, FIRST_POSE)
-_TORQUES = np.s_[..., FIXED_REPORT_ROWS:]
-_POSE, _REFERENCE_POSE = np.s_[..., FIRST_POSE : FIRST_POSE + 4], np.s_[..., FIRST_POSE + 4 : FIRST_POSE + 8]
-_IMPULSE = np.s_[..., FIRST_RECORD + 1 : FIRST_RECORD + 3]
+# Rows of a report; looked up once, since a robot alone is told every 5 µs
+_TERMS, _TORQUES = slice(FIRST_TERM, FIRST_POSE), slice(FIXED_REPORT_ROWS, None)
+_POSE, _REFERENCE_POSE = slice(FIRST_POSE, FIRST_POSE + 4), slice(FIRST_POSE + 4, FIRST_POSE + 8)
+_POWER, _IMPULSE, _NORMAL_IMPULSE = FIRST_RECORD, slice(FIRST_RECORD + 1, FIRST_RECORD + 3), FIRST_RECORD + 3
+_IMPACTS, _IMPACT_TRACTION = FIRST_RECORD + 6, FIRST_RECORD + IMPACT_TRACTION
+_TRACTION_USE, _WHEELS_LIFTED = FIRST_RECORD + ASKS, FIRST_RECORD + ASKS + 1
+_PROGRESS, _PROGRESS_SHARE, _CLEARANCE = FIRST_SITUATION, FIRST_SITUATION + 1, FIRST_SITUATION + 2
 
 
-def named(reports: NDArray[np.float64], terms: tuple[str, ...]) -> dict[str, Any]:
+def named(reports: NDArray[np.float64], terms: tuple[str, ...], slipping: int = 0) -> dict[str, Any]:
     """Named quantities of all robots, from reports (quantities, robots): arrays (robots,) or (robots, width).
 
     Of one robot, from its report (quantities,): numbers or arrays (width,). Reward terms are in a dictionary.
+    slipping: how many wheels may slip, whose slips stand behind the torques.
     """
+    if slipping:
+        infos = named(reports[:-slipping], terms)
+        infos["wheel_slip"] = reports[-slipping:].T
+        return infos
     row: Any = reports
+    torque, impulse = reports[_TORQUES], reports[_IMPULSE]
+    pose, reference_pose = reports[_POSE], reports[_REFERENCE_POSE]
     if reports.ndim > 1:
         left, unfinite, touched = reports[:ENDINGS] > 0.0
+        torque, impulse, pose, reference_pose = torque.T, impulse.T, pose.T, reference_pose.T
     else:
         row = reports.tolist()  # numbers of one robot are Python's own
         left, unfinite, touched = row[LEFT_CORRIDOR] > 0.0, row[NOT_FINITE] > 0.0, row[TOUCHED] > 0.0
-    columns = reports.T
     return {
         "position_error": row[POSITION_ERROR],
         "heading_error": row[HEADING_SIN],
         "reward_terms": dict(zip(terms, row[_TERMS], strict=False)),
-        "torque": columns[_TORQUES],
-        "power": row[FIRST_RECORD],
-        "traction_use": row[FIRST_RECORD + ASKS],
-        "wheels_lifted": row[FIRST_RECORD + ASKS + 1],
+        "torque": torque,
+        "power": row[_POWER],
+        "traction_use": row[_TRACTION_USE],
+        "wheels_lifted": row[_WHEELS_LIFTED],
         "conditioning": row[CONDITIONING],
-        "pose": columns[_POSE],
-        "reference_pose": columns[_REFERENCE_POSE],
-        "progress": row[FIRST_SITUATION],
-        "progress_share": row[FIRST_SITUATION + 1],
-        "clearance": row[FIRST_SITUATION + 2],
-        "impacts": row[FIRST_RECORD + 6],
-        "impulse": columns[_IMPULSE],
-        "impact_traction": row[FIRST_RECORD + IMPACT_TRACTION],
-        "normal_impulse": row[FIRST_RECORD + 3],
+        "pose": pose,
+        "reference_pose": reference_pose,
+        "progress": row[_PROGRESS],
+        "progress_share": row[_PROGRESS_SHARE],
+        "clearance": row[_CLEARANCE],
+        "impacts": row[_IMPACTS],
+        "impulse": impulse,
+        "impact_traction": row[_IMPACT_TRACTION],
+        "normal_impulse": row[_NORMAL_IMPULSE],
         "left_corridor": left,
         "not_finite": unfinite,
         "touched": touched,

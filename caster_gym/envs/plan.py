@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.floor import Floor
 from caster_gym.mechanics.separation import Surroundings
 
 
@@ -34,6 +35,7 @@ class Pace(NamedTuple):
     corridor: float  # [m]
     start_offset: float  # [m]
     start_turn: float  # [rad]
+    floor: Floor | None = None  # None: wheels roll without slip
 
 
 def joined(tables: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -5,19 +5,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.engines.lanes import BODY_ROWS
 from caster_gym.envs.block_layout import (
     ENDINGS,
     FIRST_POSE,
     FIRST_RECORD,
     FIXED_REPORT_ROWS,
 )
+from caster_gym.floor import Floor
 from caster_gym.mechanics import ground
 from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.floor import floor_table, wheel_frictions
+from caster_gym.mechanics.free_casters import slip_velocity
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import each, pairs
 from caster_gym.mechanics.separation import Obstacles
+from caster_gym.mechanics.slip import slip_step, unpack_slip_state
 from caster_gym.robot import Robot
 
 Array = NDArray[np.float64]
@@ -41,6 +46,8 @@ class Scene:
     impulse: Array  # (2,) of obstacles on the robot during the last control period [N s]
     impact_point: Array  # (2,) where the last of them acted [m]; NaN if there was none
     failed: bool  # the episode has terminated
+    slip: Array  # (N, 2) of each wheel over the floor, along its rolling direction and to its left [m/s]
+    floor: Floor | None = None  # None: wheels roll without slip
 
 
 def draw_scene(
@@ -52,20 +59,28 @@ def draw_scene(
     path: Array,
     corridor: float,
     obstacles: Obstacles,
+    floor: Floor | None,
+    time_step: float,
 ) -> Scene:
-    """The scene of a robot with a state (7 + 2 N,) and the report of its last control period, see `tracking.report`.
+    """The scene of a robot with a state, see `TaskEngine.states`, and the report of its last control period.
 
-    wrench (3,): what pushed it from outside, beside obstacles, at C in B [N, N, N m].
+    wrench (3,): what pushed it from outside, beside obstacles, at C in B [N, N, N m]. time_step [s]: of the task.
     """
-    torque, record = report[FIXED_REPORT_ROWS:], report[FIRST_RECORD:]
+    end, n = FIXED_REPORT_ROWS + 2 * robot.caster_count, robot.caster_count
+    torque, record = report[FIXED_REPORT_ROWS:end], report[FIRST_RECORD:]
+    push = wrench + record[9:12]
+    if floor is None:
+        forces, slip = _ground_forces(robot, state, torque, push), np.zeros((n, 2))
+    else:
+        forces, slip = _slipping_forces(robot, state, torque, push, floor, time_step)
     return Scene(
         robot=robot,
         time=time,
         pose=state[:4],
         twist=state[4:7],
-        directions=state[7:].reshape(-1, 2),
+        directions=state[BODY_ROWS : BODY_ROWS + 2 * n].reshape(-1, 2),
         torque=torque,
-        ground_forces=_ground_forces(robot, state, torque, wrench, record[9:12]),
+        ground_forces=forces,
         path=path,
         corridor=corridor,
         reference=report[FIRST_POSE + 4 : FIRST_POSE + 8],
@@ -73,14 +88,29 @@ def draw_scene(
         impulse=record[1:3],
         impact_point=record[4:6] if record[6] > 0.0 else np.full(2, np.nan),
         failed=bool(report[:ENDINGS].any()),
+        slip=slip,
+        floor=floor,
     )
 
 
-def _ground_forces(robot: Robot, state: Array, torque: Array, wrench: Array, held: Array) -> Array:
+def _ground_forces(robot: Robot, state: Array, torque: Array, push: Array) -> Array:
     """Forces (N, 2) of the floor on each wheel along its rolling direction and to its left. [N]"""
     parameters, now = robot_parameters(robot), unpack_state(tuple(state.tolist()))
     at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
-    x, y, moment = (wrench + held).tolist()
+    x, y, moment = push.tolist()
     rate = forward_dynamics(now.twist, now.directions, at_joints, (x, y, moment), parameters)
     shared = now.twist, rate, parameters.platform.coulomb_speed
     return np.array(each(ground.ground_force, shared, now.directions, parameters.casters, at_joints))
+
+
+def _slipping_forces(
+    robot: Robot, state: Array, torque: Array, push: Array, floor: Floor, time_step: float
+) -> tuple[Array, Array]:
+    """The same on a floor of finite friction, mean over the coming time step; and how wheels slip now (N, 2) [m/s]."""
+    parameters, now = robot_parameters(robot), unpack_slip_state(tuple(state.tolist()))
+    at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
+    x, y, moment = push.tolist()
+    frictions = wheel_frictions(now.position, now.heading, now.directions, floor_table(floor).patches, parameters)
+    _, footfall = slip_step(now, at_joints, (x, y, moment), time_step, frictions, parameters)
+    slips = each(slip_velocity, (now.twist,), now.directions, now.rates, parameters.casters)
+    return np.array(footfall.forces), np.array(slips)

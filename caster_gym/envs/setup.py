@@ -27,6 +27,8 @@ from caster_gym.envs.task import Task
 from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
+from caster_gym.floor import Floor
+from caster_gym.mechanics.floor import check_slips
 from caster_gym.mechanics.separation import Surroundings
 from caster_gym.paths.specification import AnyPath, build_trajectories, read_paths
 from caster_gym.paths.specification import PathLike as PathLike
@@ -59,7 +61,8 @@ def track_engine(
     longest: greatest number of control periods of an episode.
     """
     check_keywords(fields, (*KEYWORDS, *TrackTask.model_fields), "CasterTrack", TrackTask.usual_names)
-    chosen, task = _chosen(robot, actuation), track_task.read_task(fields)
+    task = track_task.read_task(fields)
+    chosen = _chosen(robot, actuation, task.slippery)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _track_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
@@ -78,7 +81,8 @@ def follow_engine(
 ) -> tuple[TaskEngine, FollowTask]:
     """The same for the following task."""
     check_keywords(fields, (*KEYWORDS, *FollowTask.model_fields), "CasterFollow", FollowTask.usual_names)
-    chosen, task = _chosen(robot, actuation), follow_task.read_task(fields)
+    task = follow_task.read_task(fields)
+    chosen = _chosen(robot, actuation, task.slippery)
     check_time_step(chosen, task.time_step, task.substeps)  # first: planning takes longer
     plan = _follow_plan(chosen, read_paths(path), read_arena(arena), task, longest)
     return TaskEngine(
@@ -162,8 +166,13 @@ def _arenas(
     return Surroundings(hull, obstacles), spans
 
 
-def _chosen(robot: RobotLike, actuation: Actuation) -> Robot:
+def _chosen(robot: RobotLike, actuation: Actuation, floor: Floor | None) -> Robot:
+    """The robot with its driven joints, and on a floor of finite friction with that friction."""
     chosen = load_robot(robot)
+    if floor is not None:
+        check_slips(chosen)
+    if floor is not None and floor.friction is not None:
+        chosen = chosen.model_copy(update={"floor_friction": floor.friction})
     if actuation is not None:
         chosen = chosen.with_actuation(actuation if isinstance(actuation, str) else tuple(actuation))
     warn_if_singular(chosen)
@@ -172,7 +181,7 @@ def _chosen(robot: RobotLike, actuation: Actuation) -> Robot:
 
 
 def _pace(task: Task) -> Pace:
-    return Pace(task.substeps, task.time_step, task.corridor, task.start_offset, task.start_turn)
+    return Pace(task.substeps, task.time_step, task.corridor, task.start_offset, task.start_turn, task.slippery)
 
 
 def _spans(rows: NDArray[np.int64], periods: NDArray[np.int64], longest: int | None) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.arena.clearance import ROUNDING
+from caster_gym.engines.lanes import BODY_ROWS
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.block_layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
 from caster_gym.envs.guides import Courses
@@ -18,6 +19,9 @@ from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.randomness import bits, episode_seed
 from caster_gym.envs.task_engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.tracking import Reference, start
+from caster_gym.mechanics.integration import pack_state, unpack_state
+from caster_gym.mechanics.parameters import unpack_parameters
+from caster_gym.mechanics.slip import rolling_state
 from caster_gym.paths.trajectory import rounded_down
 from caster_gym.robot import Robot
 
@@ -111,13 +115,26 @@ def _put(engine: TaskEngine, selected: NDArray[np.int64], wanted: Start) -> None
         states[:, 2], states[:, 3] = np.cos(wanted.pose[:, 2]), np.sin(wanted.pose[:, 2])
     if wanted.twist is not None:
         states[:, 4:7] = wanted.twist
+    end = BODY_ROWS + 2 * engine.robot.caster_count
+    cos, sin = states[:, BODY_ROWS:end:2], states[:, BODY_ROWS + 1 : end : 2]
     if wanted.steering is not None:
-        states[:, 7::2], states[:, 8::2] = np.cos(wanted.steering), np.sin(wanted.steering)
+        cos[:], sin[:] = np.cos(wanted.steering), np.sin(wanted.steering)
     if wanted.twist is not None:
-        check_motion(engine.robot, np.arctan2(states[:, 8::2], states[:, 7::2]), wanted.twist)
+        check_motion(engine.robot, np.arctan2(sin, cos), wanted.twist)
+    if engine.slipping:
+        states[:, end:] = rolling(states[:, :end], engine.parameters[selected])
     engine.put(selected, states)
     if wanted.pose is not None and wanted.place is None and isinstance(engine.plan.guide, Courses):
         _find_place(engine, selected, wanted.pose[:, :2])
+
+
+def rolling(states: Array, parameters: Array) -> Array:
+    """Numbers (robots, 2 N + 2) behind those of states (robots, 7 + 2 N) in which no wheel slips yet.
+
+    parameters (robots, fields): of each robot.
+    """
+    state = rolling_state(unpack_state(tuple(states.T)), unpack_parameters(tuple(parameters.T)))
+    return np.stack(pack_state(state)[states.shape[1] :], axis=1)
 
 
 def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -> None:

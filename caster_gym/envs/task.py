@@ -1,12 +1,13 @@
 """What all tasks have in common: time, corridor, starts, obstacles and costs."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from caster_gym.configuration import Frozen
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
+from caster_gym.floor import Floor
 
 
 class Task(Frozen):
@@ -32,6 +33,10 @@ class Task(Frozen):
         "obstacles": "obstacles stand in 'arena'",
         "trajectory": "the path is given as 'path'",
         "paths": "the path, or a list of them, is given as 'path'",
+        "friction": "the floor's friction is the 'friction' of 'floor', e.g. floor={'friction': 0.3}",
+        "floor_friction": "the floor's friction is the 'friction' of 'floor', e.g. floor={'friction': 0.3}",
+        "ground": "floor",
+        "terrain": "floor",
     }
 
     control_period: Annotated[float, Field(ge=SHORTEST_PERIOD, le=1.0)] = 0.02  # [s] between actions
@@ -41,15 +46,27 @@ class Task(Frozen):
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
     touching: Literal["allowed", "ends"] = "allowed"  # what touching an obstacle means for the episode
     nearest: Annotated[int, Field(ge=0, le=16)] = 0  # obstacles that the observation shows
+    floor: Literal["grip"] | Floor = "grip"  # or one of finite friction, on which wheels may slip
     effort_weight: NonNegativeFloat = 0.02
     impact_weight: NonNegativeFloat = 0.0
     impact_scale: PositiveFloat = 0.5  # [N s] normal impulse in a control period that costs half of the weight
     coarse: Annotated[float, Field(gt=1.0)] = 10.0  # length of the wide reward kernel over that of the fine one
 
+    @field_validator("floor", mode="before")
+    @classmethod
+    def _a_mapping_is_a_floor(cls, floor: Any) -> Any:
+        """What is wrong with it is then told of it alone, and not of the word `grip` too."""
+        return Floor.model_validate(floor) if isinstance(floor, Mapping) else floor
+
     @property
     def time_step(self) -> float:
         """Length of one RK4 step. [s]"""
         return self.control_period / self.substeps
+
+    @property
+    def slippery(self) -> Floor | None:
+        """The floor if wheels may slip on it, else None."""
+        return None if self.floor == "grip" else self.floor
 
     @property
     def start_reach(self) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.engines.compilation import compilations, included
+from caster_gym.engines.free_wheels import check_free_wheels
 from caster_gym.engines.held import Held
 from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.memory import check_memory
@@ -22,6 +23,8 @@ from caster_gym.envs.infos import named
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan
 from caster_gym.envs.scene import Scene, draw_scene
+from caster_gym.floor import Floor
+from caster_gym.mechanics.floor import FloorTable, floor_table
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.mechanics.separation import Obstacles
 from caster_gym.robot import Robot
@@ -47,16 +50,23 @@ class TaskEngine:
 
     def __init__(self, robot: Robot, plan: Plan, pace: Pace, observed: ObservationLayout, count: int) -> None:
         check_time_step(robot, pace.time_step, pace.substeps)
+        if pace.floor is not None:
+            numbers = np.array([pack_parameters(robot_parameters(robot))])
+            check_free_wheels(f"robot {robot.name!r}", numbers, pace.time_step, pace.substeps)
         self.robot, self.plan, self.layout, self.count = robot, plan, observed, count
         self.on_restart: list[Callable[[NDArray[np.int64]], None]] = []
         self._pace = pace
         self._sizes = layout.Sizes(
-            tuple(range(robot.caster_count)), tuple(range(len(observed.preview))), tuple(range(observed.nearest))
+            tuple(range(robot.caster_count)),
+            tuple(range(len(observed.preview))),
+            tuple(range(observed.nearest)),
+            tuple(range(robot.caster_count if pace.floor is not None else 0)),
         )
+        self.slipping = len(self._sizes.slipping)  # wheels that may slip: none, or all
         check_memory(count, layout.desk_rows(self._sizes))
         self.spread = np.array([pace.start_offset, pace.start_turn])  # [m], [rad] greatest displacements of a start
         self.corridor, self.control_period = pace.corridor, pace.substeps * pace.time_step  # [m], [s]
-        self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count
+        self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count + self.slipping
         self._told: NDArray[np.float64] | None = None  # latest reports of a batch that is drawn, copied for pictures
         self._late: NDArray[np.int64] | None = None  # (robots,) clocks at which episodes began, unless all were 0
         kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
@@ -76,7 +86,7 @@ class TaskEngine:
         seeds: NDArray[np.uint64],
     ) -> None:
         """Put what changes from step to step together with what stays. A robot alone lives on its desk, `blocks`."""
-        plan, robot, count = self.plan, self.robot, self.count
+        plan, robot, count, floor = self.plan, self.robot, self.count, self._pace.floor
         among = len(plan.around.obstacles.radii) > 0
         self._desk = blocks.reshape(-1) if count == 1 else np.zeros(layout.desk_rows(self._sizes) * LANES)
         self._world = layout.World(
@@ -89,6 +99,7 @@ class TaskEngine:
             hull=plan.around.hull if among else None,
             obstacles=plan.around.obstacles if among else None,
             arenas=plan.arenas if among else None,
+            floor=None if floor is None else _table(floor),
             substeps=self._pace.substeps,
             time_step=self._pace.time_step,
         )
@@ -252,7 +263,7 @@ class TaskEngine:
         clocks: NDArray[np.int64] | None = None,
         progress: NDArray[np.float64] | None = None,
     ) -> None:
-        """Give some robots other states (selected, 7 + 2 N), clocks [control periods] and progress [m] (selected,)."""
+        """Give some robots other states (selected, numbers), clocks [control periods] and progress [m] (selected,)."""
         rows = self._world.blocks.reshape(len(self._world.blocks), -1, LANES)
         block, lane = selected // LANES, selected % LANES
         if states is not None:
@@ -284,7 +295,10 @@ class TaskEngine:
 
     @property
     def states(self) -> NDArray[np.float64]:
-        """A copy of all states (robots, 7 + 2 N), laid out as in `caster_gym.engines.numba_fleet.Fleet`."""
+        """A copy of all states (robots, 7 + 2 N), laid out as in `caster_gym.engines.numba_fleet.Fleet`.
+
+        Where wheels may slip, the rates of all casters and the tilt follow (robots, 9 + 4 N), as in `pack_state`.
+        """
         return from_lanes(self._world.blocks, 0, layout.room_row(self._sizes), self.count)
 
     @states.setter
@@ -317,6 +331,8 @@ class TaskEngine:
         """Refuse robots of numbers (robots, fields) that the time step cannot follow; what: their name in the error."""
         called = f"robots like {self.robot.name!r} of other numbers" if what is None else what
         check_rows(called, rows, self._pace.time_step, self._pace.substeps)
+        if self._pace.floor is not None:
+            check_free_wheels(called, rows, self._pace.time_step, self._pace.substeps)
 
     def set_parameters(self, selected: NDArray[np.int64], rows: NDArray[np.float64], *, checked: bool = False) -> None:
         """Give some robots other numbers than their robot file says; rows (selected, fields) as in `parameters`.
@@ -341,7 +357,7 @@ class TaskEngine:
 
     def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
         """Named quantities of all robots, or one; see `caster_gym.envs.infos`."""
-        return named(reports, self.plan.terms)
+        return named(reports, self.plan.terms, self.slipping)
 
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
@@ -357,6 +373,8 @@ class TaskEngine:
             self.plan.tables[path][:, :2],
             self._pace.corridor,
             self._obstacles_beside(path),
+            self._pace.floor,
+            self._pace.time_step,
         )
 
     def keep_reports(self) -> None:
@@ -379,3 +397,9 @@ class TaskEngine:
     def _obstacles_beside(self, path: int) -> Obstacles:
         around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
         return around._replace(radii=around.radii[near:end], spans=around.spans[near:end])
+
+
+def _table(floor: Floor) -> FloorTable:
+    """The numbers of a floor, of one type whether there are patches or not: so that one compilation does for all."""
+    table = floor_table(floor)
+    return table._replace(patches=np.zeros((0, 4)) if table.patches is None else table.patches)

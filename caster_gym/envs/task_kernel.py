@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from caster_gym.engines.guarding import borrowed_hull, borrowed_obstacles, reach_of, settled, worth_measuring
+from caster_gym.engines.guarding import (
+    borrowed_floor,
+    borrowed_hull,
+    borrowed_obstacles,
+    reach_of,
+    settled,
+    worth_measuring,
+)
 from caster_gym.engines.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.engines.numba_compiler import INLINE, borrowed, compiled, teach
 from caster_gym.envs import compilation, randomness
@@ -38,6 +45,7 @@ from caster_gym.envs.block_layout import (
 from caster_gym.envs.delivery import copy_rows, deliver, give_results
 from caster_gym.envs.guides import POINT_ROWS, REFERENCE_ROWS, borrowed_guide, guide_robot, judge, weights_of
 from caster_gym.envs.randomness import uniform
+from caster_gym.envs.slipping import begun, feel_floor, note_slips, slips_of, state_of, surface_of
 from caster_gym.envs.tracking import (
     ASKS,
     GAP_LIMIT,
@@ -50,6 +58,7 @@ from caster_gym.envs.tracking import (
     report,
     start,
 )
+from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import driven_step, guarded_driven_step
 from caster_gym.mechanics.scalars import add, clip, each, flatten, maximum
@@ -83,6 +92,7 @@ def _borrowed_world(w: World) -> World:
         borrowed_hull(w.hull),
         borrowed_obstacles(w.obstacles),
         _borrowed_arenas(w.arenas),
+        borrowed_floor(w.floor),
         w.substeps,
         w.time_step,
     )
@@ -127,7 +137,7 @@ def _take_care(desk: Any, first: Any, here: Any, share: Any, obstacles: Any, wor
     for lane in range(here):
         if desk[room_row(sizes) * LANES + lane] < 0.0:
             near, end = _neighbourhood(first + lane, world)
-            careful_step(desk, lane, share, near, end, world.hull, obstacles, world.time_step, sizes)
+            careful_step(desk, lane, share, near, end, world.hull, obstacles, world.floor, world.time_step, sizes)
 
 
 @register_jitable(**INLINE)
@@ -154,12 +164,14 @@ def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Si
             desk[row * LANES + lane] = 0.0
     for _ in range(world.substeps):
         _measure(desk, first, here, world.obstacles, world, sizes)
+        feel_floor(desk, lanes, world.floor, sizes)
         for lane in range(lanes):
-            state = read_state(desk, lane, 0, sizes.casters)
+            state = state_of(desk, lane, world.floor, sizes)
             commands = read_pairs(desk, lane, command_row(sizes), sizes.casters)
             wrench = read(desk, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
             robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
-            target, drive = driven_step(state, commands, wrench, h, robot)
+            surface = surface_of(desk, lane, world.floor, sizes)
+            target, drive = driven_step(state, commands, wrench, h, robot, surface)
             room = desk[room_at * LANES + lane]
             end, room, went = settled(world.obstacles, room, state, target, h, reach)
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
@@ -167,6 +179,7 @@ def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Si
             write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
             asked = went * drive.asks.traction, went * drive.asks.lifted
             write(desk, lane, asks_row, each(maximum, (), asked, read(desk, lane, asks_row, asked)))
+            note_slips(desk, lane, went, target, robot, world.floor, sizes)
             desk[room_at * LANES + lane] = room
         _take_care(desk, first, here, share, world.obstacles, world, sizes)
 
@@ -179,22 +192,25 @@ def _careful_step(
     end: Any,
     hull: Hull,
     obstacles: Obstacles,
+    floor: Any,
     h: Any,
     sizes: Sizes,
 ) -> None:
     """One substep of a robot that may touch something."""
     hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
-    state = read_state(desk, lane, 0, sizes.casters)
+    state = state_of(desk, lane, floor, sizes)
     commands = read_pairs(desk, lane, command_row(sizes), sizes.casters)
     wrench = read(desk, lane, wrench_row(sizes), (0.0, 0.0, 0.0))
     robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
-    state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end)
+    surface = surface_of(desk, lane, floor, sizes)
+    state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end, surface)
     mean = each(_scaled, (share,), flatten(drive.torques))
     write(desk, lane, 0, pack_state(state))
     rows = torque_row(sizes)
     write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))
     done = Record(*read(desk, lane, record_row(sizes), _RECORD))
     write(desk, lane, record_row(sizes), record_of(done, drive, touch, share)[:])
+    note_slips(desk, lane, 1.0, state, robot, floor, sizes)
     desk[room_row(sizes) * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
 
 
@@ -209,12 +225,12 @@ def _read_neighbour(desk: Any, lane: Any, row: Any, index: Any) -> Any:
 
 
 @register_jitable(**INLINE)
-def _look(desk: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
+def _look(desk: Any, first: Any, lanes: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
     """Observe and score robots whose reference has been fetched."""
     weights = weights_of(guide)
     for i in range(lanes):
         lane = first + i
-        state = read_state(desk, lane, 0, sizes.casters)
+        state = state_of(desk, lane, floor, sizes)
         torques = read_pairs(desk, lane, torque_row(sizes), sizes.casters)
         record = Record(*read(desk, lane, record_row(sizes), _RECORD))
         reference = Reference(*read(desk, lane, reference_row(sizes), _REFERENCE))
@@ -224,8 +240,9 @@ def _look(desk: Any, first: Any, lanes: Any, guide: Any, sizes: Sizes) -> None:
         robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
         errors, ended, terms = judge(state, reference, torques, record, situation, robot, weights)
         told = report(state, reference, errors, torques, record, situation, ended, terms, robot)
-        write(desk, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, robot))
-        write(desk, lane, report_row(sizes), flat_report(told, torques))
+        rates = all_joint_rates(state, robot, floor)
+        write(desk, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, rates, robot))
+        write(desk, lane, report_row(sizes), flat_report(told, torques, slips_of(desk, lane, floor, sizes)))
 
 
 @register_jitable(**INLINE)
@@ -271,23 +288,23 @@ def _step_lanes(
     for lane in range(here):
         world.clocks[0, first + lane] += 1
         _fetch(desk, lane, first + lane, world, sizes)
-    look(desk, world.guide, sizes)
+    look(desk, world.guide, world.floor, sizes)
     deliver(desk, 0, here, first, views, sizes)
     give_results(desk, here, first, world, views, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_all(desk: Any, guide: Any, sizes: Sizes) -> None:
-    _look(desk, 0, LANES, guide, sizes)
+def _look_at_all(desk: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
+    _look(desk, 0, LANES, guide, floor, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_first(desk: Any, guide: Any, sizes: Sizes) -> None:
-    look_at_one(desk, np.int64(0), guide, sizes)  # a literal 0 would be compiled anew
+def _look_at_first(desk: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
+    look_at_one(desk, np.int64(0), guide, floor, sizes)  # a literal 0 would be compiled anew
 
 
-def _look_at_one(desk: Any, lane: Any, guide: Any, sizes: Sizes) -> None:
-    _look(desk, lane, 1, guide, sizes)
+def _look_at_one(desk: Any, lane: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
+    _look(desk, lane, 1, guide, floor, sizes)
 
 
 @register_jitable(**INLINE)
@@ -364,7 +381,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         guide_robot(desk, lane, reference_row(sizes), nowhere, 0, path, -1.0, world.guide)
         reference = Reference(*read(desk, lane, reference_row(sizes), _REFERENCE))
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
-        write(desk, lane, 0, pack_state(state))
+        write(desk, lane, 0, begun(desk, lane, state, world.floor, sizes))
         for row in range(room_row(sizes), progress_row(sizes)):
             desk[row * LANES + lane] = 0.0
         desk[progress_row(sizes) * LANES + lane] = -1.0
@@ -372,7 +389,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
             desk[row * LANES + lane] = 0.0
         _fetch(desk, lane, robot, world, sizes)
         copy_rows(desk, block, lane, 1, parameter_row(sizes), 0)
-        look_at_one(desk, lane, world.guide, sizes)
+        look_at_one(desk, lane, world.guide, world.floor, sizes)
         deliver(desk, lane, 1, robot, views, sizes)
 
 

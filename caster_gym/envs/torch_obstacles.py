@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils import _pytree as pytree
 
+from caster_gym.engines.torch_motion import surface_below
 from caster_gym.envs.plan import Plan
 from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record, record_of
+from caster_gym.mechanics.floor import FloorTable
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters
-from caster_gym.mechanics.plant import guarded_driven_step
+from caster_gym.mechanics.plant import guarded_driven_step, slip_speeds
 from caster_gym.mechanics.scalars import each, flatten, pairs, where
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance, separation
+from caster_gym.mechanics.slip import unpack_slip_state
 
 _FAR = 1e6  # [m] where nobody comes
 
@@ -132,6 +135,7 @@ class TorchSurroundings:
         paths: Tensor,
         h: float,
         share: float,
+        floor: FloorTable | None,
     ) -> tuple[Tensor, Tensor, Tensor]:
         """States, records and rooms after the robots whose room is negative have made their step with care.
 
@@ -144,16 +148,22 @@ class TorchSurroundings:
         commands, (x, y, z) = given.commands[:, near].unbind(0), given.push[:, near].unbind(0)
         robot = pytree.tree_map_only(Tensor, lambda one: one[near], given.robot)
         obstacles = self.beside(paths[near])
-        state = unpack_state(bodies[:, near].unbind(0))
+        rows = bodies[:, near].unbind(0)
+        state = unpack_state(rows) if floor is None else unpack_slip_state(rows)
+        surface = None if floor is None else surface_below(state, robot, floor)
         end, drive, touch = guarded_driven_step(
-            state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans)
+            state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans), surface
         )
-        happened = record_of(Record(*record[n:, near].unbind(0)), drive, touch, share)
+        end_of_record = n + len(Record._fields)
+        happened = record_of(Record(*record[n:end_of_record, near].unbind(0)), drive, touch, share)
+        slips = list(record[end_of_record:, near].unbind(0))
+        if floor is not None:
+            slips = [torch.maximum(now, before) for now, before in zip(slip_speeds(end, robot), slips, strict=True)]
         torques = record[:n, near] + share * torch.stack(flatten(drive.torques))
         gap = clearance(end.position, end.heading, self.hull, obstacles, 0, len(self._spans))
         return (
             bodies.index_copy(1, near, torch.stack(pack_state(end))),
-            record.index_copy(1, near, torch.cat((torques, torch.stack(happened)))),
+            record.index_copy(1, near, torch.cat((torques, torch.stack((*happened, *slips))))),
             room.index_copy(0, near, gap),
         )
 

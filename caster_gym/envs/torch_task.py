@@ -17,7 +17,7 @@ from torch import Tensor
 from caster_gym.engines.guarding import settled
 from caster_gym.engines.torch_compiler import compiled
 from caster_gym.engines.torch_fleet import BODY_ROWS
-from caster_gym.engines.torch_motion import driven_rows
+from caster_gym.engines.torch_motion import driven_rows, slipping_rows, surface_below, torch_floor
 from caster_gym.engines.torch_scalars import check_memory, checked_device, checked_dtype
 from caster_gym.envs import block_layout as layout
 from caster_gym.envs.guides import Courses, judge
@@ -40,9 +40,11 @@ from caster_gym.envs.tracking import (
     report,
     start,
 )
+from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, total
+from caster_gym.mechanics.slip import rolling_state, unpack_slip_state
 
 TaskName: TypeAlias = Literal["track", "follow"]
 
@@ -54,7 +56,8 @@ _BEFORE = -1.0  # [m] progress of an episode that is about to start
 class TaskState(NamedTuple):
     """All that a batch keeps from one control period to the next; robots are the last axis."""
 
-    bodies: Tensor  # (7 + 2 N, robots): x, y, cos β, sin β in W, twist in B, cos δ, sin δ of each caster
+    bodies: Tensor  # (7 + 2 N, robots): x, y, cos β, sin β in W, twist in B, cos δ, sin δ of each caster; if wheels may
+    # slip, yaw rate over ground and rolling rate of each caster, and the tilt: 2 N + 2 rows more
     progress: Tensor  # (robots,) [m] along the path, where the task measures it
     room: Tensor  # (robots,) [m] gap to the nearest obstacle, infinite where there is none
     clocks: Tensor  # int64 (robots,) control periods done in the episode
@@ -128,6 +131,8 @@ class TorchTask:
         self.parameters: RobotParameters = robot_parameters(self.robot)
         self._guide = torch_guide(self.engine.plan.guide, self.dtype, self.device)
         self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
+        self._floor = None if self.task.slippery is None else torch_floor(self.task.slippery)
+        self._slipping = self.engine.slipping
         # plain numbers, since what is reached through other objects is looked up anew before each compiled call
         self._joints, self._substeps, self._h = 2 * self.robot.caster_count, self.task.substeps, self.task.time_step
         self._start_offset, self._start_turn = self.task.start_offset, self.task.start_turn
@@ -164,7 +169,7 @@ class TorchTask:
         rows = 3 * self.layout.size + 2 * (layout.FIXED_REPORT_ROWS + 4 * self.robot.caster_count)
         check_memory(count, rows, self.dtype, self.device)
         whole = torch.zeros(count, dtype=torch.int64, device=self.device)
-        none = self._empty(BODY_ROWS + 2 * self.robot.caster_count, count)
+        none = self._empty(layout.state_rows(self.robot.caster_count, self._floor is not None), count)
         state = TaskState(
             none,
             none[0],
@@ -198,7 +203,9 @@ class TorchTask:
             bodies, record, room = self._move(bodies, record, room, given, at_once)
             if self._around is not None:
                 share = 1.0 / substeps
-                bodies, record, room = self._around.careful_step(bodies, record, room, given, state.paths, h, share)
+                bodies, record, room = self._around.careful_step(
+                    bodies, record, room, given, state.paths, h, share, self._floor
+                )
         clocks = state.clocks + 1
         outcome, progress, room = self._look(bodies, record, clocks, state.paths, state.progress, self.parameters)
         return state._replace(bodies=bodies, progress=progress, room=room, clocks=clocks), outcome
@@ -230,8 +237,8 @@ class TorchTask:
 
     @property
     def _record_rows(self) -> int:
-        """Mean motor torques, then what a Record holds."""
-        return 2 * self.robot.caster_count + layout.RECORD_ROWS
+        """Mean motor torques, then what a Record holds, and the slips of wheels that may slip."""
+        return 2 * self.robot.caster_count + layout.RECORD_ROWS + self._slipping
 
     def _empty(self, rows: int, count: int) -> Tensor:
         return torch.zeros((rows, count), dtype=self.dtype, device=self.device)
@@ -256,20 +263,36 @@ class TorchTask:
         n = self._joints
         around, asked = self._around, slice(n + ASKS, n + ASKS + 2)
         for _ in range(steps):
-            target, done, asks = driven_rows(bodies, given.commands, given.push, self._h, given.robot, self.diagnostics)
+            target, done, asks, slips = self._stepped(bodies, given)
             share: Scalar = 1.0 / self._substeps
             if around is None:
                 bodies = target
             else:
-                now, aim = unpack_state(bodies.unbind(0)), unpack_state(target.unbind(0))
+                now, aim = self._state(bodies), self._state(target)
                 end, room, went = settled(around, room, now, aim, self._h, around.hull.reach)
                 bodies, went = torch.stack(end), went.to(self.dtype)
                 share, asks = share * went, went * asks
+                slips = None if slips is None else went * slips
             asks = torch.maximum(asks, record[asked])
-            record = torch.cat(
-                (record[: n + 1] + share * done, record[n + 1 : asked.start], asks, record[asked.stop :])
-            )
+            kept = record[asked.stop : n + layout.RECORD_ROWS]
+            rows = [record[: n + 1] + share * done, record[n + 1 : asked.start], asks, kept]
+            if slips is not None:
+                rows.append(torch.maximum(slips, record[n + layout.RECORD_ROWS :]))
+            record = torch.cat(rows)
         return bodies, record, room
+
+    def _stepped(self, bodies: Tensor, given: Given) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+        """Where an ordinary step leads, what motors did, what was asked of the floor, and how fast each wheel slips."""
+        if self._floor is None:
+            went = driven_rows(bodies, given.commands, given.push, self._h, given.robot, self.diagnostics)
+            return *went, None
+        frictions = torch.stack(surface_below(self._state(bodies), given.robot, self._floor).frictions)
+        return slipping_rows(bodies, given.commands, given.push, self._h, frictions, given.robot)
+
+    def _state(self, bodies: Tensor) -> State:
+        """The state whose rows these are."""
+        rows = bodies.unbind(0)
+        return unpack_state(rows) if self._floor is None else unpack_slip_state(rows)
 
     def _looked(
         self,
@@ -285,8 +308,9 @@ class TorchTask:
 
         guide: another one than the task's.
         """
-        state, n = unpack_state(bodies.unbind(0)), self._joints
-        torques, done = pairs(record[:n].unbind(0)), Record(*record[n:].unbind(0))
+        state, n = self._state(bodies), self._joints
+        end = n + layout.RECORD_ROWS
+        torques, done, slips = pairs(record[:n].unbind(0)), Record(*record[n:end].unbind(0)), record[end:].unbind(0)
         guide = self._guide if guide is None else guide
         guidance = guide.fetch(state, clocks, paths, before)
         reference = guidance.reference
@@ -301,9 +325,10 @@ class TorchTask:
             whole = Report(
                 ended, distance, errors.sin, errors.cos, torch.zeros_like(gap), terms, pose, wanted, done, situation
             )
-        told = list(flat_report(whole, torques))
+        told = list(flat_report(whole, torques, slips))
         told[layout.HEADING_SIN] = torch.atan2(errors.sin, errors.cos)
-        seen = observe(state, reference, errors, guidance.preview, nearest, robot)
+        rates = all_joint_rates(state, robot, self._floor)
+        seen = observe(state, reference, errors, guidance.preview, nearest, rates, robot)
         (rewards,) = total(each(_alone, (), terms))
         (failed,) = total(each(_alone, (), ended))
         truncated = clocks >= guide.spans[paths, 2]
@@ -361,7 +386,15 @@ class TorchTask:
         none = torch.zeros_like(x)
         nowhere = State((none, none), (none, none), (none, none, none), directions)
         guidance = self._guide.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)
-        return torch.stack(pack_state(start(guidance.reference, offset, turn, directions))), paths
+        bodies = torch.stack(pack_state(start(guidance.reference, offset, turn, directions)))
+        still = layout.state_rows(self._joints // 2, self._floor is not None) - len(bodies)  # rates of a robot at rest
+        return torch.cat((bodies, torch.zeros_like(bodies[:still]))), paths
+
+    def _rolling(self, bodies: Tensor) -> Tensor:
+        """Bodies (7 + 2 N, robots) on the task's floor, in which no wheel slips yet."""
+        if self._floor is None:
+            return bodies
+        return torch.stack(pack_state(rolling_state(unpack_state(bodies.unbind(0)), self.parameters)))
 
     def _displacement(self, seed: Tensor) -> tuple[tuple[Tensor, Tensor], Direction]:
         """How far a start lies beside its place, in the reference's frame [m], and its turn."""
@@ -375,7 +408,7 @@ class TorchTask:
 
         Does what `caster_gym.envs.starts` does with arrays. Raises ValueError for what can be no start.
         """
-        engine, rows = self.engine, list(bodies.unbind(0))
+        engine, rows = self.engine, list(bodies[: BODY_ROWS + self._joints].unbind(0))
         plain, chosen = paths.cpu().numpy(), checked.cpu().numpy()
         clocks, progress = torch.zeros_like(state.clocks), torch.zeros_like(state.progress)
         guide, still = engine.plan.guide, self._guide
@@ -408,7 +441,7 @@ class TorchTask:
         if courses and given.pose is not None and given.place is None:
             before = self._tensor(nearest_row(engine, plain, given.pose[:, :2]))
             progress = self._guide.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
-        return torch.stack(rows), clocks, progress, still
+        return self._rolling(torch.stack(rows)), clocks, progress, still
 
     def _tensor(self, numbers: NDArray[np.float64]) -> Tensor:
         return torch.as_tensor(numbers, dtype=self.dtype, device=self.device)

@@ -132,7 +132,10 @@ class TorchVectorEnv:
 
     @property
     def states(self) -> Tensor:
-        """A copy of all states (num_envs, 7 + 2 N), laid out as in `caster_gym.engines.torch_fleet.TorchFleet`."""
+        """A copy of all states (num_envs, 7 + 2 N), laid out as in `caster_gym.engines.torch_fleet.TorchFleet`.
+
+        Where wheels may slip, the rates of all casters and the tilt follow (num_envs, 9 + 4 N), as in `pack_state`.
+        """
         if self._now is None:
             raise RuntimeError("reset the batch before its states are read")
         return self._now[0].bodies.T.clone()

@@ -8,7 +8,6 @@ and free of roots and exponentials.
 from typing import NamedTuple, TypeAlias
 
 from caster_gym.mechanics.actuation import conditioning
-from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.contact import Touch
 from caster_gym.mechanics.integration import State, difference, pack_state
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
@@ -16,7 +15,6 @@ from caster_gym.mechanics.plant import Drive
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
-    Vector,
     clip,
     each,
     flatten,
@@ -264,9 +262,9 @@ def preview_point(state: State, point: Point) -> Point:
     )
 
 
-def caster_rates(v: Vector, f: Direction, caster: CasterParameters) -> tuple[Scalar, Scalar]:
+def caster_speeds(rates: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
     """Rolling and steering rate of one caster as speeds of the rim and of the pivot around the wheel."""
-    theta, delta = joint_rates(v, f, caster)
+    theta, delta = rates
     return theta * caster.radius / SPEED_UNIT, delta * caster.trail / SPEED_UNIT
 
 
@@ -284,9 +282,10 @@ def observe(
     errors: Errors,
     preview: tuple[Point, ...],
     nearest: tuple[Neighbour, ...],
+    rates: tuple[tuple[Scalar, Scalar], ...],
     robot: RobotParameters,
 ) -> tuple[Scalar, ...]:
-    """The observation; `caster_gym.envs.observation` names its parts."""
+    """The observation; `caster_gym.envs.observation` names its parts. rates: θ̇, δ̇ of each caster [rad/s]."""
     vx, vy, omega = state.twist
     ax, ay = to_body(state.heading, reference.ax, reference.ay)
     numbers = (
@@ -304,7 +303,7 @@ def observe(
         ay / ACCELERATION_UNIT,
         reference.alpha / YAW_ACCELERATION_UNIT,
     )
-    casters = flatten(state.directions) + flatten(each(caster_rates, (state.twist,), state.directions, robot.casters))
+    casters = flatten(state.directions) + flatten(each(caster_speeds, (), rates, robot.casters))
     ahead = flatten(each(preview_point, (state,), preview))
     return each(observed, (), numbers + casters + ahead + flatten(each(neighbour_seen, (state,), nearest)))
 
@@ -323,7 +322,7 @@ def endings(state: State, errors: Errors, record: Record, corridor: Scalar, touc
 
 
 class Report(NamedTuple):
-    """What a step tells beside observation and reward, and beside the motor torques, which follow it."""
+    """What a step tells beside observation and reward, and beside motor torques and slips, which follow it."""
 
     endings: Endings
     position_error: Scalar  # [m]
@@ -363,13 +362,15 @@ def report(
     )
 
 
-def flat_report(told: Report, torques: tuple[tuple[Scalar, Scalar], ...]) -> tuple[Scalar, ...]:
-    """The report and the motor torques as one row."""
+def flat_report(
+    told: Report, torques: tuple[tuple[Scalar, Scalar], ...], slips: tuple[Scalar, ...]
+) -> tuple[Scalar, ...]:
+    """The report, the motor torques and, where wheels may slip, their slips as one row."""
     errors = (told.position_error, told.heading_sin, told.heading_cos, told.conditioning)
     poses = told.pose + told.reference_pose
     ended = told.endings
     flags = (ended.left_corridor, ended.not_finite, ended.touched)
-    return flags + errors + told.terms + poses + told.record[:] + told.situation[:] + flatten(torques)
+    return flags + errors + told.terms + poses + told.record[:] + told.situation[:] + flatten(torques) + slips
 
 
 def start(

@@ -83,13 +83,13 @@ def grip(change: Vector, caution: Scalar, footing: Footing, limit: Limit, slide:
     a, c = ff + slide, pp + slide
     px, py = fp * wy - c * wx, fp * wx - a * wy  # P times the determinant: fewer quotients
     square = px * px + py * py
-    answer = maximum(px * (c * px - fp * py) + py * (a * py - fp * px), TINY + 0.0 * px)
+    answer = maximum(px * (c * px - fp * py) + py * (a * py - fp * px), TINY)
     rho = slide + square * (sqrt(square) * limit.inverse - (a * c - fp * fp)) / answer  # (S12)
     rho = maximum(rho, 0.0 * rho)
     a, c = ff + rho, pp + rho
     px, py = fp * wy - c * wx, fp * wx - a * wy
     scale = 1.0 / maximum(a * c - fp * fp, sqrt(px * px + py * py) * limit.inverse)  # (S11)
-    across = (1.0 - caution) / maximum(a * py * py - 2.0 * fp * px * py + c * px * px, TINY + 0.0 * px)
+    across = (1.0 - caution) / maximum(a * py * py - 2.0 * fp * px * py + c * px * px, TINY)
     kept = caution * scale
     slides = rho > 0.0
     stiffness = (  # (S13)

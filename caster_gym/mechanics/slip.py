@@ -61,6 +61,9 @@ from caster_gym.mechanics.scalars import (
 Pair = tuple[Scalar, Scalar]
 
 
+NO_TIME = 1e-9  # [s] robots of a batch that have nothing left of their step stay where they are, with finite loads
+
+
 class Footfall(NamedTuple):
     """What the floor did to the wheels in a time step, one number or pair a wheel."""
 
@@ -130,7 +133,7 @@ def lasting_slide(before: Pair, halfway: Pair, free: Pair) -> Pair:
     x, y = halfway[0] - before[0], halfway[1] - before[1]
     square = before[0] * before[0] + before[1] * before[1]
     nothing = 0.0 * square
-    lasts = clip(2.0 - 16.0 * (x * x + y * y) / maximum(square, TINY + nothing), nothing, 1.0 + nothing)
+    lasts = clip(2.0 - 16.0 * (x * x + y * y) / maximum(square, TINY), nothing, 1.0 + nothing)
     return free[0] + lasts * before[0], free[1] + lasts * before[1]
 
 
@@ -246,7 +249,7 @@ def tilt_after(
     robot: RobotParameters,
 ) -> Pair:
     """`ground.tilt` of a robot whose twist and rates change as they do over a stage. [N m]"""
-    rate = 1.0 / part.time
+    rate = 1.0 / maximum(part.time, NO_TIME)
     v_rate = (rate * change[0], rate * change[1], rate * change[2])
     motions = each(caster_motion, (rate,), start.rates, rates, middle.rates)
     casters = total(each(free_tilt, (middle.twist, v_rate), middle.directions, motions, robot.casters))
@@ -350,5 +353,5 @@ def slip_step(
     end = with_velocities(end, add(state.twist, change), rates, tilted)
     slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
     answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))
-    forces, uses = each(mean_force, (1.0 / h,), grips), each(used_share, (), grips, limits)
+    forces, uses = each(mean_force, (1.0 / maximum(h, NO_TIME),), grips), each(used_share, (), grips, limits)
     return end, Footfall(slips, forces, each(pressing, (), loads), uses, answer)

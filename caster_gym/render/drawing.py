@@ -17,6 +17,8 @@ WHEEL_WIDTH = 0.62  # of its radius; the robot file knows none
 SHOWN_ACCELERATION = 2.0  # [m/s²] the forces that give it to the robot are drawn as long as the robot reaches
 LONGEST_ARROW = 1.6  # of the robot's reach
 SHOWN_SPEED = 0.5  # [m/s] the impulse that gives it to the robot is drawn as long as the robot reaches
+SHOWN_SLIP = 0.5  # [m/s] a wheel that slips as fast has an arrow as long as the robot reaches
+LEAST_SLIP = 1e-3  # [m/s] of a wheel that is drawn as slipping
 LEAST_DETAIL = 26.0  # [px] reach of the robot, at unit size, below which its forces are not drawn
 
 
@@ -41,18 +43,23 @@ def draw_reference(canvas: Canvas, view: View, scene: Scene, unit: float) -> Non
 
 
 def draw_robot(canvas: Canvas, view: View, scene: Scene, unit: float) -> None:
-    """Outline with its front, casters as they are steered, forces of the floor on the wheels, and C."""
+    """Outline with its front, casters as they are steered, slip and forces of the floor on the wheels, and C."""
     size = reach(scene.robot) * view.scale
     colour = palette.FAILED if scene.failed else palette.BODY
     body = _outline(scene.robot.platform.footprint)
     outline = view.pixels(_to_world(body, scene.pose))
     canvas.polygon(outline, colour, 0.2)
-    for caster, f in zip(scene.robot.casters, scene.directions, strict=True):
-        _draw_caster(canvas, view, scene.pose, caster, f, unit)
+    slips = np.hypot(*scene.slip.T) > LEAST_SLIP
+    for caster, f, slipping in zip(scene.robot.casters, scene.directions, slips, strict=True):
+        tread = palette.SLIP if slipping else palette.WHEEL
+        _draw_caster(canvas, view, scene.pose, caster, f, tread, unit)
     canvas.line(_closed(outline), max(0.9, min(2.2, 0.06 * size)) * unit, colour)
     canvas.polygon(view.pixels(_to_world(_front(body), scene.pose)), colour)
     if size >= LEAST_DETAIL * unit:
-        for wheel, force in _forces(scene):
+        for (wheel, way), slipping in zip(_arrows(scene, scene.slip, slip_scale(scene.robot)), slips, strict=True):
+            if slipping:
+                canvas.arrow(view.pixels(wheel), view.pixels(wheel + way), 2.6 * unit, palette.SLIP)
+        for wheel, force in _arrows(scene, scene.ground_forces, force_scale(scene.robot)):
             canvas.arrow(view.pixels(wheel), view.pixels(wheel + force), 2.6 * unit, palette.FORCE)
     centre = view.pixels(scene.pose[:2])
     radius = max(2.0, 2.4 * unit, min(0.09 * size, 5.0 * unit))  # [px] 2 of them can be seen
@@ -79,19 +86,26 @@ def force_scale(robot: Robot) -> float:
     return reach(robot) * len(robot.casters) / (total_mass(robot) * SHOWN_ACCELERATION)
 
 
+def slip_scale(robot: Robot) -> float:
+    """Length at which speeds of slip are drawn. [s]"""
+    return reach(robot) / SHOWN_SLIP
+
+
 def total_mass(robot: Robot) -> float:
     """Mass of platform, links and wheels. [kg]"""
     return robot.platform.mass + sum(caster.link.mass + caster.wheel.mass for caster in robot.casters)
 
 
-def _draw_caster(canvas: Canvas, view: View, pose: Array, caster: Caster, f: Array, unit: float) -> None:
+def _draw_caster(
+    canvas: Canvas, view: View, pose: Array, caster: Caster, f: Array, colour: palette.Colour, unit: float
+) -> None:
     """Wheel, link and pivot; the link leads from the pivot along the trail, then across to the wheel."""
     across = np.array([-f[1], f[0]])
     pivot = np.array([caster.x, caster.y])
     wheel = pivot - caster.trail * f + caster.offset * across
     tread = rounded_rectangle(2.0 * caster.radius, WHEEL_WIDTH * caster.radius, 0.2 * caster.radius)
     tyre = wheel + tread[:, :1] * f + tread[:, 1:] * across
-    canvas.polygon(view.pixels(_to_world(tyre, pose)), palette.WHEEL)
+    canvas.polygon(view.pixels(_to_world(tyre, pose)), colour)
     thick = max(1.2 * unit, min(0.2 * caster.radius * view.scale, 3.5 * unit))
     link = view.pixels(_to_world(np.stack([pivot, pivot - caster.trail * f, wheel]), pose))
     canvas.line(link, thick, palette.LINK)
@@ -100,11 +114,10 @@ def _draw_caster(canvas: Canvas, view: View, pose: Array, caster: Caster, f: Arr
     canvas.disc(link[2], 0.5 * thick, palette.LINK)
 
 
-def _forces(scene: Scene) -> list[tuple[Array, Array]]:
-    """Each wheel's centre and the arrow of its force, both in W. [m]"""
+def _arrows(scene: Scene, vectors: Array, scale: float) -> list[tuple[Array, Array]]:
+    """Each wheel's centre and the arrow of its vector along its rolling direction and to its left, both in W. [m]"""
     arrows = []
-    scale = force_scale(scene.robot)
-    for caster, f, (along, left) in zip(scene.robot.casters, scene.directions, scene.ground_forces, strict=True):
+    for caster, f, (along, left) in zip(scene.robot.casters, scene.directions, vectors, strict=True):
         across = np.array([-f[1], f[0]])
         wheel = np.array([caster.x, caster.y]) - caster.trail * f + caster.offset * across
         arrow = _bounded(scale * (along * f + left * across), scene.robot)

@@ -1,4 +1,4 @@
-"""What stands still: the floor, the path with its corridor, and the obstacles."""
+"""What stands still: the floor with its patches, the path with its corridor, and the obstacles."""
 
 import math
 
@@ -22,10 +22,21 @@ def draw_floor(canvas: Canvas, view: View, scene: Scene, unit: float) -> None:
     canvas.clip(view.area)
     canvas.fill(palette.GROUND)
     _draw_corridor(canvas, view, scene, unit)
+    draw_patches(canvas, view, scene, unit)
     _draw_grid(canvas, view, unit)
     canvas.line(view.pixels(scene.path), 1.6 * unit, palette.PATH)
     draw_obstacles(canvas, view, scene.obstacles, unit)
     canvas.clip(None)
+
+
+def draw_patches(canvas: Canvas, view: View, scene: Scene, unit: float) -> None:
+    """Where the floor has a friction of its own: less than around it, or more."""
+    for patch in () if scene.floor is None else scene.floor.patches:
+        ice = patch.friction < scene.robot.floor_friction
+        colour, edge = (palette.ICE, palette.ICE_EDGE) if ice else (palette.ROUGH, palette.ROUGH_EDGE)
+        centre, radius = view.pixels((patch.x, patch.y)), patch.radius * view.scale
+        canvas.disc(centre, radius, edge)
+        canvas.disc(centre, max(radius - 1.5 * unit, 0.0), colour)
 
 
 def draw_scale(canvas: Canvas, view: View, unit: float) -> None:

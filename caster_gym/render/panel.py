@@ -9,7 +9,7 @@ from caster_gym.envs.scene import Scene
 from caster_gym.render import palette
 from caster_gym.render.canvas import Canvas
 from caster_gym.render.drawing import draw_motion, force_scale
-from caster_gym.render.floor import BACKING, draw_obstacles
+from caster_gym.render.floor import BACKING, draw_obstacles, draw_patches
 from caster_gym.render.history import History
 from caster_gym.render.view import Area, around, reach, round_length
 
@@ -42,6 +42,7 @@ def draw_close_up(canvas: Canvas, area: Area, scene: Scene, history: History, un
     view = around(scene.pose[:2], CLOSE * reach(scene.robot), area)
     canvas.clip(area)
     canvas.fill(palette.GROUND)
+    draw_patches(canvas, view, scene, unit)
     canvas.line(view.pixels(scene.path), 2.0 * unit, palette.PATH)
     draw_obstacles(canvas, view, scene.obstacles, unit)
     draw_motion(canvas, view, scene, history, 1.25 * unit)
