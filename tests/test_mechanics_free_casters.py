@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model
 from caster_gym.mechanics.caster import rates as rolling_rates
+from caster_gym.mechanics.caster_masses import without_friction
 from caster_gym.mechanics.free_casters import (
     border,
     carry_casters,
@@ -16,7 +17,6 @@ from caster_gym.mechanics.free_casters import (
     slip_energy,
     slip_inertia,
     slip_velocity,
-    without_friction,
 )
 from caster_gym.mechanics.ground import joint_motion
 from caster_gym.mechanics.parameters import robot_parameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.mechanics.linear import dot, extreme_eigenvalues, multiply, solve
+from caster_gym.mechanics.linear import dot, extreme_eigenvalues, factors, multiply, solve, substitute
 
 EPS = np.finfo(float).eps
 
@@ -77,3 +77,15 @@ def test_eigenvalues_do_not_depend_on_the_unit():
     one = np.stack(extreme_eigenvalues(packed(matrix)))
     assert_allclose(np.stack(extreme_eigenvalues(packed(1e-8 * matrix))), 1e-8 * one, rtol=1e-9)
     assert_allclose(np.stack(extreme_eigenvalues(packed(1e8 * matrix))), 1e8 * one, rtol=1e-9)
+
+
+def test_factors_serve_several_right_sides():
+    """As `solve` does, against NumPy's elimination."""
+    rng = np.random.default_rng(8)
+    a = rng.normal(size=(50, 3, 3))
+    matrix, sides = a @ a.swapaxes(-1, -2) + np.eye(3), rng.normal(size=(2, 50, 3))
+    found = factors(packed(matrix))
+    for b in sides:
+        x = np.stack(substitute(found, tuple(b.T)), -1)
+        expected = np.linalg.solve(matrix, b[..., None])[..., 0]
+        assert_allclose(x, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())  # rounding of sums and conditioning

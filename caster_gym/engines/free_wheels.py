@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from caster_gym.engines.time_scales import STEPS_TO_TOP
 from caster_gym.engines.time_step import MOST_SUBSTEPS, follows, rounded_down, substeps_for
-from caster_gym.mechanics.free_casters import held_inertia
+from caster_gym.mechanics.caster_masses import held_inertia
 from caster_gym.mechanics.parameters import CasterParameters, unpack_parameters
 
 Array = NDArray[np.float64]

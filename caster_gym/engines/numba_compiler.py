@@ -20,6 +20,7 @@ from caster_gym.engines.numba_loops import INLINE
 from caster_gym.mechanics import (
     actuation,
     caster,
+    caster_masses,
     contact,
     contact_impulses,
     dynamics,
@@ -38,6 +39,7 @@ from caster_gym.mechanics import (
     separation,
     slip,
     slip_impact,
+    slip_tilt,
 )
 
 __all__ = ["INLINE", "borrowed", "compiled", "teach"]
@@ -124,11 +126,13 @@ for _module in (
     first_contact,
     contact_impulses,
     contact,
+    caster_masses,
     free_casters,
     floor_friction,
     floor,
     slip,
     slip_impact,
+    slip_tilt,
     grip_or_slip,
 ):
     teach(_module)

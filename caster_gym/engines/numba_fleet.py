@@ -9,6 +9,15 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.engines.compilation import Work
+from caster_gym.engines.fleet_rows import (
+    find_frictions,
+    friction_row,
+    parameter_row,
+    room_row,
+    state_of,
+    surface_of,
+    torque_row,
+)
 from caster_gym.engines.guarding import (
     borrowed_floor,
     borrowed_hull,
@@ -22,10 +31,8 @@ from caster_gym.engines.lanes import (
     LANES,
     block_count,
     from_lanes,
-    read,
     read_pairs,
     read_robot,
-    read_slip_state,
     read_state,
     to_lanes,
     write,
@@ -36,10 +43,10 @@ from caster_gym.engines.threads import over_blocks
 from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
 from caster_gym.floor import Floor
 from caster_gym.mechanics.contact import guarded_step
-from caster_gym.mechanics.floor import Surface, floor_table, own_friction, parameters_on, patch_friction
+from caster_gym.mechanics.floor import floor_table, parameters_on
 from caster_gym.mechanics.free_casters import slip_velocity
 from caster_gym.mechanics.grip_or_slip import free_step
-from caster_gym.mechanics.integration import State, pack_state, unpack_state
+from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
     PLATFORM_FIELDS,
@@ -49,92 +56,10 @@ from caster_gym.mechanics.parameters import (
     pack_parameters,
     unpack_parameters,
 )
-from caster_gym.mechanics.scalars import each, either
+from caster_gym.mechanics.scalars import each
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance
 from caster_gym.mechanics.slip import rolling_state, unpack_slip_state
 from caster_gym.robot import Robot
-
-
-@register_jitable(**INLINE)
-def torque_row(casters: Any, floor: Any) -> int:
-    """First row of the joint torques, behind the state."""
-    if floor is None:
-        return BODY_ROWS + 2 * len(casters)
-    return BODY_ROWS + 4 * len(casters) + 2
-
-
-@register_jitable(**INLINE)
-def room_row(casters: Any, floor: Any) -> int:
-    """Row of the room; negative while the coming step is to be taken with care."""
-    return torque_row(casters, floor) + 2 * len(casters)
-
-
-@register_jitable(**INLINE)
-def friction_row(casters: Any, floor: Any) -> int:
-    """First row of the floor's friction under each wheel, if wheels may slip. Parameters follow."""
-    return room_row(casters, floor) + 1
-
-
-@register_jitable(**INLINE)
-def parameter_row(casters: Any, floor: Any) -> int:
-    """First row of the robot's parameters."""
-    if floor is None:
-        return friction_row(casters, floor)
-    return friction_row(casters, floor) + len(casters)
-
-
-@register_jitable(**INLINE)
-def _state_of(block: Any, lane: Any, casters: Any, floor: Any) -> Any:
-    """State of one robot."""
-    return either(floor, read_state, _slip_state, (block, lane, 0, casters))
-
-
-@register_jitable(**INLINE)
-def _slip_state(_floor: Any, block: Any, lane: Any, row: Any, casters: Any) -> State:
-    return read_slip_state(block, lane, row, casters)
-
-
-@register_jitable(**INLINE)
-def _surface(block: Any, lane: Any, casters: Any, floor: Any) -> Any:
-    """The floor under one robot; None if it grips."""
-    return either(floor, _grip, _finite_friction, (block, lane, casters))
-
-
-@register_jitable(**INLINE)
-def _grip(_block: Any, _lane: Any, _casters: Any) -> None:
-    return
-
-
-@register_jitable(**INLINE)
-def _finite_friction(floor: Any, block: Any, lane: Any, casters: Any) -> Surface:
-    return Surface(read(block, lane, friction_row(casters, floor), casters), floor.contact_time)
-
-
-@register_jitable(**INLINE)
-def _find_frictions(block: Any, lanes: Any, casters: Any, floor: Any) -> None:
-    """Find the friction under the wheels of all robots."""
-    if floor is None:
-        return
-    _look_at_patches(block, lanes, casters, floor, floor.patches)
-
-
-@register_jitable(**INLINE)
-def _look_at_patches(block: Any, lanes: Any, casters: Any, floor: Any, patches: Any) -> None:
-    """Where there are patches; else every wheel keeps its friction."""
-    if patches is None:
-        return
-    row, parameters = friction_row(casters, floor), parameter_row(casters, floor)
-    for lane in range(lanes):
-        robot = read_robot(block, lane, parameters, casters)
-        write(block, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
-    for k in range(len(patches)):
-        patch = (patches[k, 0], patches[k, 1], patches[k, 2], patches[k, 3])
-        for lane in range(lanes):  # neighbours side by side, a patch at a time
-            state = read_slip_state(block, lane, 0, casters)
-            robot = read_robot(block, lane, parameters, casters)
-            before = read(block, lane, row, casters)
-            shared = state.position, state.heading, patch
-            write(block, lane, row, each(patch_friction, shared, before, state.directions, robot.casters))
 
 
 @register_jitable(**INLINE)
@@ -167,12 +92,12 @@ def _step_lanes(
     """One step of the first lanes of one block, of which the first `here` hold robots and the rest are spare."""
     row, reach = room_row(casters, floor), reach_of(hull)
     _measure(block, here, h, hull, obstacles, casters, floor)
-    _find_frictions(block, lanes, casters, floor)
+    find_frictions(block, lanes, casters, floor)
     for lane in range(lanes):
-        state = _state_of(block, lane, casters, floor)
+        state = state_of(block, lane, casters, floor)
         torques = read_pairs(block, lane, torque_row(casters, floor), casters)
         robot = read_robot(block, lane, parameter_row(casters, floor), casters)
-        target = free_step(state, torques, (0.0, 0.0, 0.0), h, robot, _surface(block, lane, casters, floor))
+        target = free_step(state, torques, (0.0, 0.0, 0.0), h, robot, surface_of(block, lane, casters, floor))
         end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, reach)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
@@ -185,10 +110,10 @@ def _careful_step(
     """One step of a robot that may touch something."""
     hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
     row, count = room_row(casters, floor), len(obstacles.radii)
-    state = _state_of(block, lane, casters, floor)
+    state = state_of(block, lane, casters, floor)
     torques = read_pairs(block, lane, torque_row(casters, floor), casters)
     robot = read_robot(block, lane, parameter_row(casters, floor), casters)
-    surface = _surface(block, lane, casters, floor)
+    surface = surface_of(block, lane, casters, floor)
     state, _ = guarded_step(state, torques, (0.0, 0.0, 0.0), h, robot, hull, obstacles, 0, count, surface)
     write(block, lane, 0, pack_state(state))
     block[row * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, 0, count)

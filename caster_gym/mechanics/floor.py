@@ -6,7 +6,7 @@ import numpy as np
 
 from caster_gym.floor import Floor
 from caster_gym.mechanics.caster import wheel_centre
-from caster_gym.mechanics.free_casters import held_inertia
+from caster_gym.mechanics.caster_masses import held_inertia
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import (
     CasterParameters,

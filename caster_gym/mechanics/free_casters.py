@@ -14,6 +14,13 @@ three rows for the platform. Once the casters are eliminated, one by one, what i
 from typing import NamedTuple
 
 from caster_gym.mechanics.caster import pivot_velocity
+from caster_gym.mechanics.caster_masses import (
+    Slopes,
+    first_moments,
+    friction_slopes,
+    held_inertia,
+    without_friction,
+)
 from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
 from caster_gym.mechanics.linear import dot, solve
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
@@ -24,20 +31,10 @@ from caster_gym.mechanics.scalars import (
     Vector,
     add,
     each,
-    maximum,
-    sqrt,
     total,
 )
 
 Pair = tuple[Scalar, Scalar]
-
-
-class Slopes(NamedTuple):
-    """One number for each kind of friction in a caster."""
-
-    roll: Scalar  # of the rolling joint
-    steer: Scalar  # of the steering joint
-    scrub: Scalar  # of the contact patch against the yaw over ground
 
 
 class OwnInertia(NamedTuple):
@@ -75,20 +72,6 @@ def slip_velocity(v: Vector, f: Direction, rates: Pair, caster: CasterParameters
     a, b = pivot_velocity(v, f, caster)
     eta, theta = rates
     return a - caster.offset * eta - caster.radius * theta, b - caster.trail * eta  # (S1)
-
-
-def first_moments(caster: CasterParameters) -> tuple[Scalar, Scalar, Scalar]:
-    """Mass of wheel and link [kg], its moment behind the pivot and to the left of it [kg m]."""
-    behind = caster.wheel_mass * caster.trail + caster.link_mass * caster.link_behind
-    left = caster.wheel_mass * caster.offset + caster.link_mass * caster.link_left
-    return caster.wheel_mass + caster.link_mass, behind, left
-
-
-def held_inertia(caster: CasterParameters) -> tuple[Scalar, Scalar]:
-    """Inertia of link and wheel about the pivot, and of the wheel about its axle, without rotors. [kg m²]"""
-    d, s, behind, left = caster.trail, caster.offset, caster.link_behind, caster.link_left
-    wheel, link = caster.wheel_mass * (d * d + s * s), caster.link_mass * (behind * behind + left * left)
-    return caster.yaw_inertia + caster.link_inertia + wheel + link, caster.spin_inertia
 
 
 def own_inertia(shares: Slopes, caster: CasterParameters) -> OwnInertia:
@@ -141,40 +124,6 @@ def floor_mobility(own: OwnInertia, caster: CasterParameters) -> tuple[Scalar, S
     ee, et, tt = own.inverse
     d, s, r = caster.trail, caster.offset, caster.radius
     return s * s * ee + 2.0 * s * r * et + r * r * tt, d * (s * ee + r * et), d * d * ee  # (S5)
-
-
-def joint_slope(rate: Scalar, viscous: Scalar, coulomb: Scalar, coulomb_speed: Scalar) -> Scalar:
-    """Friction of a joint for each unit of its rate: `dynamics.joint_friction` over the rate. [N m s/rad]"""
-    return viscous + coulomb / sqrt(rate * rate + coulomb_speed * coulomb_speed)
-
-
-def friction_slopes(omega: Scalar, coulomb_speed: Scalar, rates: Pair, caster: CasterParameters) -> Slopes:
-    """Friction of one caster for each unit of its rates. [N m s/rad]"""
-    eta, theta = rates
-    return Slopes(
-        joint_slope(theta, caster.roll_viscous, caster.roll_coulomb, coulomb_speed),
-        joint_slope(eta - omega, caster.steer_viscous, caster.steer_coulomb, coulomb_speed),
-        caster.scrub,
-    )
-
-
-def implicit_share(h: Scalar, slope: Scalar, inertia: Scalar) -> Scalar:
-    """What friction of a slope [N m s/rad] adds to an inertia [kg m²] when half of it is that of the step's end.
-
-    More than half where the step is long, so that friction stops a light wheel and does not turn it back. (S8)
-    """
-    whole = h * slope
-    return maximum(0.5 * whole, whole - inertia)
-
-
-def implicit_shares(h: Scalar, slopes: Slopes, caster: CasterParameters) -> Slopes:
-    """`implicit_share` of each kind of friction in one caster. [kg m²]"""
-    yaw, spin = held_inertia(caster)
-    return Slopes(
-        implicit_share(h, slopes.roll, spin + caster.roll_armature),
-        implicit_share(h, slopes.steer, 0.5 * (yaw + caster.steer_armature)),  # two brake the yaw
-        implicit_share(h, slopes.scrub, 0.5 * (yaw + caster.steer_armature)),
-    )
 
 
 def turning_forces(v: Vector, f: Direction, rates: Pair, caster: CasterParameters) -> Forces:
@@ -247,12 +196,6 @@ def push_back(impulse: Pair, own: OwnInertia, caster: CasterParameters) -> Pair:
     ee, et, tt = own.inverse
     e, t = -caster.offset * impulse[0] - caster.trail * impulse[1], -caster.radius * impulse[0]
     return ee * e + et * t, et * e + tt * t
-
-
-def without_friction(caster: CasterParameters) -> Slopes:
-    """No friction in a caster."""
-    nothing = 0.0 * caster.x
-    return Slopes(nothing, nothing, nothing)
 
 
 def slip_inertia(directions: tuple[Direction, ...], robot: RobotParameters) -> Symmetric:

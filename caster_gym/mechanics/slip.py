@@ -6,7 +6,8 @@ so that wheels that are held stay at rest at the floor, and slip starts, ends an
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.caster import pivot_velocity, rates
+from caster_gym.mechanics.caster import rates
+from caster_gym.mechanics.caster_masses import friction_slopes, implicit_shares
 from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
 from caster_gym.mechanics.floor_friction import (
     TINY,
@@ -32,18 +33,14 @@ from caster_gym.mechanics.free_casters import (
     floor_rows,
     follow,
     free_response,
-    friction_slopes,
-    implicit_shares,
     joint_forces,
     own_inertia,
-    pivot_rows,
     push_back,
     slip_velocity,
     turning_forces,
 )
-from caster_gym.mechanics.ground import platform_tilt, wheel_loads
+from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.linear import dot
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import (
     Direction,
@@ -57,11 +54,9 @@ from caster_gym.mechanics.scalars import (
     pairs,
     total,
 )
+from caster_gym.mechanics.slip_tilt import NO_TIME, tilt_after
 
 Pair = tuple[Scalar, Scalar]
-
-
-NO_TIME = 1e-9  # [s] robots of a batch that have nothing left of their step stay where they are, with finite loads
 
 
 class Footfall(NamedTuple):
@@ -212,49 +207,9 @@ def rates_after(change: Vector, grips: tuple[Grip, ...], part: Stage, robot: Rob
     return each(follow, (change,), each(pushed, (), part.free, answers), part.edges)
 
 
-def caster_motion(rate: Scalar, before: Pair, after: Pair, now: Pair) -> tuple[Pair, Pair]:
-    """Rates of a caster now [rad/s], and what they change by in a second [rad/s²]."""
-    return now, (rate * (after[0] - before[0]), rate * (after[1] - before[1]))
-
-
-def free_tilt(
-    v: Vector, v_rate: Vector, f: Direction, motion: tuple[Pair, Pair], caster: CasterParameters
-) -> tuple[Scalar, Scalar]:
-    """Moment, as height times force along x and y of B, by which a caster that may slip tilts the robot. [N m]"""
-    (eta, theta), (eta_rate, theta_rate) = motion
-    along, across = pivot_rows(f, caster)
-    a, b = pivot_velocity(v, f, caster)
-    a_f, a_p = dot(along, v_rate) - v[2] * b, dot(across, v_rate) + v[2] * a
-    d, s, behind, left = caster.trail, caster.offset, caster.link_behind, caster.link_left
-    wheel = a_f - s * eta_rate + d * eta * eta, a_p - d * eta_rate - s * eta * eta
-    link = a_f - left * eta_rate + behind * eta * eta, a_p - behind * eta_rate - left * eta * eta
-    m_w, m_l = caster.radius * caster.wheel_mass, caster.radius * caster.link_mass
-    p = m_w * wheel[0] + m_l * link[0] + caster.spin_inertia * theta_rate  # (S10)
-    q = m_w * wheel[1] + m_l * link[1] + caster.spin_inertia * theta * eta
-    return p * f[0] - q * f[1], p * f[1] + q * f[0]
-
-
 def pressing(load: Scalar) -> Scalar:
     """A load that is not negative. [N]"""
     return maximum(load, 0.0 * load)
-
-
-def tilt_after(
-    change: Vector,
-    rates: tuple[Pair, ...],
-    start: State,
-    middle: State,
-    part: Stage,
-    wrench: Vector,
-    robot: RobotParameters,
-) -> Pair:
-    """`ground.tilt` of a robot whose twist and rates change as they do over a stage. [N m]"""
-    rate = 1.0 / maximum(part.time, NO_TIME)
-    v_rate = (rate * change[0], rate * change[1], rate * change[2])
-    motions = each(caster_motion, (rate,), start.rates, rates, middle.rates)
-    casters = total(each(free_tilt, (middle.twist, v_rate), middle.directions, motions, robot.casters))
-    platform = platform_tilt(middle.twist, v_rate, wrench, robot.platform)
-    return platform[0] + casters[0], platform[1] + casters[1]
 
 
 def limit_of(time: Scalar, friction: Scalar, load: Scalar) -> Limit:
@@ -333,7 +288,7 @@ def slip_step(
     change, grips = cut_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
     middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
-    tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
+    tilted = tilt_after(change, rates, state, middle, half, wrench, robot)
     end = moved(h, state, middle)
     known = turning_lag(grips, 2.0, middle.directions, end.directions, robot)
     part = stage(h, state, middle, end.directions, known, torques, wrench, robot)
@@ -349,7 +304,7 @@ def slip_step(
     change, slides = newton_round(change, 0.0, problem, slides)
     change, grips = final_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
-    tilted = tilt_after(change, rates, state, middle, part, wrench, robot)
+    tilted = tilt_after(change, rates, state, middle, h, wrench, robot)
     end = with_velocities(end, add(state.twist, change), rates, tilted)
     slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
     answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))

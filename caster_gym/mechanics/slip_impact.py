@@ -6,6 +6,7 @@ more than friction · load · time. A wheel that slides already is not held; its
 
 from typing import NamedTuple
 
+from caster_gym.mechanics.caster_masses import without_friction
 from caster_gym.mechanics.contact_impulses import RESTING
 from caster_gym.mechanics.dynamics import platform_inertia
 from caster_gym.mechanics.floor import Surface
@@ -32,7 +33,6 @@ from caster_gym.mechanics.free_casters import (
     own_inertia,
     push_back,
     slip_velocity,
-    without_friction,
 )
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
