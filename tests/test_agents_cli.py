@@ -59,7 +59,7 @@ def test_each_command_explains_itself(call, command):
         (["evaluate", "nobody"], "neither a folder of a policy nor a model-based agent called 'nobody'; such are comp"),
         (["evaluate", "ppo"], "agent 'ppo' must be trained first"),
         (["evaluate", "computed_torque", "--task", "nowhere"], "there is no 'nowhere' in tasks"),
-        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, track"),
+        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, patch_of_ice,"),
         (["train", "--set", "steps"], "--set needs KEY=VALUE, got 'steps'"),
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (

@@ -15,6 +15,7 @@ from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
+from caster_gym.floor import Floor
 
 LEARNERS = ("ppo", "ppo_gpu", "sac", "shac")
 INTERNAL = {  # of SB3's constructors, which nobody sets from a command line
@@ -99,7 +100,7 @@ def test_answers_name_fields_and_options_that_exist():
         TaskSettings,
         BenchmarkSettings,
     ):
-        known = {*model.model_fields, *TaskSettings.model_fields, *BenchmarkSettings.model_fields}
+        known = {*model.model_fields, *TaskSettings.model_fields, *BenchmarkSettings.model_fields, *Floor.model_fields}
         known |= {"duration", "laps", "seed", "device", "path", "robots"}  # of paths, agents and environments
         for answer in model.usual_names.values():
             assert set(re.findall(r"'(\w+)'", answer)) <= known, answer
