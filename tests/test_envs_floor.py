@@ -311,8 +311,8 @@ def test_the_scene_shows_how_wheels_slip_and_what_the_floor_gives():
     assert scene.floor == env.task.floor
     assert (scene.slip[:, 0] < -0.1).all()
     assert_allclose(np.hypot(*scene.slip.T), info["wheel_slip"], rtol=0.2)  # now, and the greatest within the period
-    loads = Model(env.robot).wheel_loads(np.zeros(3))
-    assert_allclose(np.hypot(*scene.ground_forces.T), 0.05 * loads, rtol=0.05)  # accelerating shifts the loads a little
+    weight = Model(env.robot).wheel_loads(np.zeros(3)).sum()
+    assert_allclose(np.hypot(*scene.ground_forces.T).sum(), 0.05 * weight, rtol=1e-9)  # whichever wheels carry it
     assert (scene.ground_forces[:, 0] > 0.0).all()
 
 
