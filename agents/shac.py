@@ -192,7 +192,12 @@ def make_task(task: TaskSettings, settings: SHACSettings) -> TorchTask:
 
 
 def _fewest_substeps(task: TaskSettings) -> int:
-    """RK4 steps of a control period: as few as the robot's casters allow, at most the task's own."""
+    """RK4 steps of a control period: as few as the robot's casters allow, at most the task's own.
+
+    Where wheels may slip, the task's own: the error of such a time step is of first order.
+    """
+    if task.task.slippery is not None:
+        return task.task.substeps
     robot = load_robot(task.robot)
     return min(substeps_for(task.task.control_period, longest_time_step(robot)), task.task.substeps)
 

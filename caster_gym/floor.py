@@ -1,7 +1,7 @@
 """The floor as it is written in YAML and in Python: one that wheels may slip on. Points are in W."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, PositiveFloat
 
@@ -15,6 +15,13 @@ Friction = Annotated[float, Field(ge=0.0, le=GREATEST)]
 class Patch(Frozen):
     """A disc of the floor with a friction of its own, such as a patch of ice."""
 
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "mu": "friction",
+        "centre": "give the centre as 'x' and 'y' [m]",
+        "center": "give the centre as 'x' and 'y' [m]",
+        "position": "give the centre as 'x' and 'y' [m]",
+        "size": "radius",
+    }
     friction: Friction  # [-] between it and a wheel whose contact point lies on it
     x: float  # [m] its centre
     y: float
@@ -24,6 +31,13 @@ class Patch(Frozen):
 class Floor(Frozen):
     """A floor of finite friction. Without one the floor grips: wheels roll and never slip."""
 
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "mu": "friction",
+        "floor_friction": "friction",
+        "coefficient": "friction",
+        "discs": "patches",
+        "ice": "patches",
+    }
     friction: Annotated[float, Field(gt=0.0, le=GREATEST)] | None = None  # [-] else the robot's own `floor_friction`
     contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
     patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts

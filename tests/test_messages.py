@@ -39,6 +39,9 @@ PROMISES = {
     "caster_gym/arena/beside.py": [
         "arena_beside::test_where_there_is_no_room_the_path_is_named_and_so_many_as_are_told_fit"
     ],
+    "caster_gym/engines/free_wheels.py": [
+        "engines_free_wheels::test_a_step_that_throws_light_wheels_beyond_their_top_speed_is_refused_with_one_that_does_not"
+    ],
     "caster_gym/engines/time_step.py": [
         "engines_time_step::test_the_number_of_substeps_that_a_refusal_names_would_do",
         "engines_time_step::test_where_no_number_of_substeps_would_do_something_else_is_named_that_does",

@@ -96,7 +96,7 @@ def test_a_force_is_drawn_at_its_wheel_along_its_direction():
 
 def test_a_wheel_that_slips_has_an_arrow_along_its_slip():
     slip = np.zeros((3, 2))
-    slip[1] = (0.0, 0.3)  # to the left of the second wheel, which rolls ahead
+    slip[1] = (0.0, 0.8)  # to the left of the second wheel, which rolls ahead
     frame, view = drawn(scene(0.0, 0.0, slip=slip), follow=0.6)
     robot = scene().robot
     wheel = view.pixels((robot.casters[1].x - robot.casters[1].trail, robot.casters[1].y))

@@ -33,8 +33,8 @@ class Task(Frozen):
         "obstacles": "obstacles stand in 'arena'",
         "trajectory": "the path is given as 'path'",
         "paths": "the path, or a list of them, is given as 'path'",
-        "friction": "the floor's friction is the 'friction' of 'floor', e.g. floor={'friction': 0.3}",
-        "floor_friction": "the floor's friction is the 'friction' of 'floor', e.g. floor={'friction': 0.3}",
+        "friction": "wheels slip on a 'floor' of finite friction, such as {friction: 0.3}",
+        "floor_friction": "wheels slip on a 'floor' of finite friction, such as {friction: 0.3}",
         "ground": "floor",
         "terrain": "floor",
     }

@@ -17,7 +17,7 @@ WHEEL_WIDTH = 0.62  # of its radius; the robot file knows none
 SHOWN_ACCELERATION = 2.0  # [m/s²] the forces that give it to the robot are drawn as long as the robot reaches
 LONGEST_ARROW = 1.6  # of the robot's reach
 SHOWN_SPEED = 0.5  # [m/s] the impulse that gives it to the robot is drawn as long as the robot reaches
-SHOWN_SLIP = 0.5  # [m/s] a wheel that slips as fast has an arrow as long as the robot reaches
+SHOWN_SLIP = 1.0  # [m/s] a wheel that slips as fast has an arrow as long as the robot reaches
 LEAST_SLIP = 1e-3  # [m/s] of a wheel that is drawn as slipping
 LEAST_DETAIL = 26.0  # [px] reach of the robot, at unit size, below which its forces are not drawn
 
