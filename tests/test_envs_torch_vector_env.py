@@ -176,7 +176,7 @@ def test_bad_input_is_refused():
         ours.step(torch.zeros((2, 5)))
     with pytest.raises(ValueError, match=r"the same number of casters, got \[3, 4\]"):
         ours.set_robots([load_robot("chung2008"), random_robot(1, 4)])
-    with pytest.raises(ValueError, match=r"rows must have shape \(2, 96\), got \(2, 94\)"):
+    with pytest.raises(ValueError, match=r"rows must have shape \(2, 100\), got \(2, 94\)"):
         ours.set_parameters(torch.zeros((2, 94)))
 
 
