@@ -52,6 +52,7 @@ SIGNED = ("payload_mass", "payload_x", "payload_y", "steering_zero", "torque_del
 
 _UNTELLABLE = {
     "floor_friction": "wheels that roll without slip move alike on any floor",
+    "height": "it shifts the loads on the wheels, which wheels that roll without slip do not feel",
     "position_bias": "a robot moves alike wherever it stands",
     "rate": "pushes are no property of the robot; leave the rows with pushes out",
     "noise": "noise is estimated in any case, see the table of errors",
