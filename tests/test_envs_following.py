@@ -124,7 +124,7 @@ WEIGHTS = FollowTask().weights()
 
 
 def follow_terms(errors=NO_ERROR, share=1.0, effort=0.0, pressing=0.0, failed=0.0):
-    record = Record(0.0, 0.0, 0.0, pressing, 0.0, 0.0, 0.0)
+    record = Record(*(0.0,) * len(Record._fields))._replace(pressing=pressing)
     return following.follow_terms(errors, share, effort, record, failed, WEIGHTS)
 
 

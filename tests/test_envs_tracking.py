@@ -17,7 +17,7 @@ EXACT = 1e-12  # rounding of a few hundred operations on numbers of order 1
 
 def untouched(power=0.0):
     """The record of a control period without impacts."""
-    return Record(power, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Record(*(0.0,) * len(Record._fields))._replace(power=power)
 
 
 WEIGHTS = TrackTask().weights()

@@ -234,9 +234,8 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         terms = tracking.reward_terms(errors, tracking.mean_effort(torques, parameters), record, 0.0, weights)
         assert terms._asdict() == m.info["reward_terms"]
         situation = Situation(0.0, 0.0, np.inf)
-        report = tracking.report(state, reference, errors, torques, record, situation, ended, terms, parameters)
+        report = tracking.report(state, reference, errors, record, situation, ended, terms, parameters)
         assert report.position_error == m.info["position_error"]
-        assert report.traction_use == m.info["traction_use"]
         assert report.conditioning == m.info["conditioning"]
         assert report.endings == (0.0, 0.0, 0.0)
         assert np.arctan2(report.heading_sin, report.heading_cos) == pytest.approx(m.info["heading_error"], abs=1e-15)
@@ -254,4 +253,4 @@ def test_without_obstacles_nothing_touches(moments):
 
 def untouched(power=0.0):
     """The record of a control period without impacts."""
-    return Record(power, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Record(*(0.0,) * len(Record._fields))._replace(power=power)

@@ -239,7 +239,7 @@ def _look(desk: Any, first: Any, lanes: Any, guide: Any, floor: Any, sizes: Size
         nearest = each(_read_neighbour, (desk, lane, nearest_row(sizes)), counting(sizes.nearest))
         robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
         errors, ended, terms = judge(state, reference, torques, record, situation, robot, weights)
-        told = report(state, reference, errors, torques, record, situation, ended, terms, robot)
+        told = report(state, reference, errors, record, situation, ended, terms, robot)
         rates = all_joint_rates(state, robot, floor)
         write(desk, lane, observation_row(sizes), observe(state, reference, errors, points, nearest, rates, robot))
         write(desk, lane, report_row(sizes), flat_report(told, torques, slips_of(desk, lane, floor, sizes)))

@@ -318,7 +318,7 @@ class TorchTask:
         situation = Situation(guidance.progress, guidance.share, gap)
         errors, ended, terms = judge(state, reference, torques, done, situation, robot, guide.weights)
         if self.diagnostics:
-            whole = report(state, reference, errors, torques, done, situation, ended, terms, robot)
+            whole = report(state, reference, errors, done, situation, ended, terms, robot)
         else:
             pose, wanted = state.position + state.heading, (reference.x, reference.y, reference.cos, reference.sin)
             distance = sqrt(distance_square(errors))

@@ -340,14 +340,13 @@ def report(
     state: State,
     reference: Reference,
     errors: Errors,
-    torques: tuple[tuple[Scalar, Scalar], ...],
     record: Record,
     situation: Situation,
     ended: Endings,
     terms: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar],
     robot: RobotParameters,
 ) -> Report:
-    """Errors and diagnostics of the present state after a control period with the given mean motor torques."""
+    """Errors and diagnostics of the present state after a control period."""
     return Report(
         ended,
         sqrt(distance_square(errors)),
