@@ -47,6 +47,17 @@ def on_floor(robot: RobotParameters, floor: Floor) -> RobotParameters:
     return robot._replace(platform=robot.platform._replace(floor_friction=friction))
 
 
+def robot_on(robot: Robot, floor: Floor) -> Robot:
+    """The same of a robot as it is described; a floor may have no friction at all, which is no robot's own."""
+    return robot if floor.friction is None else robot.model_copy(update={"floor_friction": floor.friction})
+
+
+def where_it_grips_most(robot: Robot, floor: Floor) -> Robot:
+    """A robot where the floor has its greatest friction, be it that of a patch."""
+    greatest = max((robot_on(robot, floor).floor_friction, *(patch.friction for patch in floor.patches)))
+    return robot.model_copy(update={"floor_friction": greatest})
+
+
 def check_slips(robot: Robot) -> None:
     """Refuse a robot whose casters have no inertia of their own: nothing would hold a wheel that slips."""
     for number, caster in enumerate(robot.casters, start=1):
