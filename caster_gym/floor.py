@@ -38,7 +38,7 @@ class Floor(Frozen):
         "discs": "patches",
         "ice": "patches",
     }
-    friction: Annotated[float, Field(gt=0.0, le=GREATEST)] | None = None  # [-] else the robot's own `floor_friction`
+    friction: Friction | None = None  # [-] else the robot's own `floor_friction`
     contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
     patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts
 

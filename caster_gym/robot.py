@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
+from caster_gym.floor import GREATEST
 from caster_gym.plausibility import warn_if_implausible
 
 
@@ -135,7 +136,8 @@ class Robot(Frozen):
     platform: Platform
     casters: Annotated[tuple[Caster, ...], Field(min_length=2)]
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
-    floor_friction: PositiveFloat = 0.7  # [-] between wheels and floor; tells how much of it is used
+    # [-] between wheels and floor; tells how much of it is used
+    floor_friction: Annotated[float, Field(gt=0.0, le=GREATEST)] = 0.7
     coulomb_speed: PositiveFloat = 0.1  # [rad/s] rate of a joint below which its dry friction fades to zero
 
     @field_validator("actuation", mode="before")
