@@ -87,6 +87,19 @@ def parameters_on(robot: Robot, dynamics: Dynamics, floor: Floor | None) -> Robo
     return on_floor(robot_parameters(robot), floor)
 
 
+def wrong_state(shape: tuple[int, ...], count: int, casters: int, slippery: bool) -> str:
+    """What to say of states whose shape no fleet of so many robots has."""
+    rolling, slipping = (count, 7 + 2 * casters), (count, 9 + 4 * casters)
+    if slippery:
+        return f"state must have shape {slipping}, or {rolling} of wheels that start rolling, got {shape}"
+    if shape == slipping:
+        return (
+            f"state must have shape {rolling}, got {shape}, which is that of states on a floor of finite friction, "
+            "such as floor={'friction': 0.7}"
+        )
+    return f"state must have shape {rolling}, got {shape}"
+
+
 def surface_under(state: State, robot: RobotParameters, floor: FloorTable | None) -> Surface | None:
     """The floor under a robot; None if it grips."""
     if floor is None:
