@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
@@ -122,6 +122,15 @@ class Footprint(Frozen):
 class Platform(Frozen):
     """The platform without its casters."""
 
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "z": "height",
+        "com_height": "height",
+        "height_of_com": "height",
+        "com_z": "height",
+        "centre_of_mass": "com",
+        "center_of_mass": "com",
+    }
+
     mass: PositiveFloat  # [kg]
     inertia: PositiveFloat  # [kg m²] about a vertical axis through its mass centre
     com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
@@ -131,6 +140,12 @@ class Platform(Frozen):
 
 class Robot(Frozen):
     """An omnidirectional robot on two or more powered casters."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "mu": "floor_friction",
+        "friction": "floor_friction",
+        **dict.fromkeys(("height", "z", "com_height"), "it belongs to the 'platform', as {height: 0.1}"),
+    }
 
     name: str
     platform: Platform

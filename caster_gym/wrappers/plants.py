@@ -4,7 +4,8 @@ Only the plant changes; agents know the nominal robot. Parameters are rows (k, f
 `caster_gym.mechanics.parameters.pack_parameters`.
 """
 
-from typing import Annotated, Literal, TypeAlias
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,8 @@ OfAFloor: TypeAlias = Annotated[Range, AfterValidator(_of_a_floor)]
 
 class Friction(Feature):
     """Other friction in each joint, drawn joint by joint, and another floor."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {"friction": "floor_friction", "mu": "floor_friction"}
 
     kind: Literal["friction"] = "friction"
     viscous_scale: Size = 1.0  # [-] of the joints' own viscous friction
