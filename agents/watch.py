@@ -28,7 +28,7 @@ SURROUNDINGS = 14.0  # floor shown around that person's robot, in reaches of it
 
 def watch(
     agent: str,
-    task: str,
+    task: str | TaskSettings,
     path: str | int = 0,
     robots: int = 1,
     seed: int = 0,
@@ -39,9 +39,10 @@ def watch(
 ) -> int:
     """Show an agent on test paths of a task; returns the number of frames shown.
 
-    agent: folder of a policy, name of a model-based agent, or "keyboard". path: index or name of a test path; with
-    several robots, the first of theirs. Without `save`, a window shows episode after episode until it is closed; with
-    it, one episode becomes a film (.mp4 or .gif), a person's drive until the window is closed. seconds: stop then.
+    task: its settings, or the name of its file. agent: folder of a policy, name of a model-based agent, or "keyboard".
+    path: index or name of a test path; with several robots, the first of theirs. Without `save`, a window shows episode
+    after episode until it is closed; with it, one episode becomes a film (.mp4 or .gif), a person's drive until the
+    window is closed. seconds: stop then.
     Raises ValueError or OSError, before anything runs, for what cannot be shown or saved.
     """
     driving = agent == KEYBOARD
@@ -51,7 +52,7 @@ def watch(
     if (driving or save is None) and not has_display():
         remedy = "" if driving else "; give --save run.mp4 or --save run.gif"
         raise ValueError(f"there is no display to open a window on{remedy}")
-    settings = read_settings(TaskSettings, "tasks", task)
+    settings = task if isinstance(task, TaskSettings) else read_settings(TaskSettings, "tasks", task)
     if driving:
         free = settings.task.model_copy(update={"corridor": FREE})
         settings = settings.model_copy(update={"task": free, "wrappers": ()})  # a person feels no delay on purpose
