@@ -166,9 +166,8 @@ def watch(
         from .watch import watch as run
 
         settings, words = choose_task(agent, task)
-        typer.echo(words)
         with limited_to(DEFAULT):
-            frames = run(agent, settings, path, robots, seed, save, overwrite, seconds)
+            frames = run(agent, settings, path, robots, seed, save, overwrite, seconds, begin=lambda: typer.echo(words))
         if save is not None:
             typer.echo(f"{frames} frames are in {save}.")
 
