@@ -17,6 +17,7 @@ from .command_line import (
     Overwrite,
     TaskName,
     Threads,
+    TrainedTask,
     changes_of,
     files_among,
     plain_errors,
@@ -86,13 +87,13 @@ def train(
 @app.command()
 def evaluate(
     policy: Annotated[str, typer.Argument(help="Folder of a trained policy, or name of a model-based agent.")],
-    task: TaskName = "track",
+    task: TrainedTask = None,
     starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
     out: Out = Path("runs/evaluate"),
     overwrite: Overwrite = False,
     threads: Threads = 1,
 ) -> None:
-    """Try an agent on the test paths of a task: a table, every episode as CSV, and figures."""
+    """Try an agent on the test paths of a task, a policy on those of its own: a table, all episodes as CSV, figures."""
     with plain_errors():
         from .benchmark import Contender, compare, ready_agent
         from .evaluation import bare, test_batch
@@ -100,16 +101,17 @@ def evaluate(
         from .provenance import write_provenance
         from .summary import table, write_episodes, write_summary
         from .threads import limited_to
+        from .trained_task import choose_task
 
-        tasks = read_settings(TaskSettings, "tasks", task)
-        settings = BenchmarkSettings(task=task, agents=(policy,), starts=starts)
+        tasks, words = choose_task(policy, task)
+        settings = BenchmarkSettings(agents=(policy,), starts=starts)
         for read in files_among(task, tasks.robot):
             check_free(out, overwrite, kept=read)
         with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
             test = test_batch(tasks, tasks.test, starts)
             agent = ready_agent(policy, tasks, test)
             results, episodes = compare([Contender(agent.name, agent, None)], test, settings)
-            text = table(results, settings.confidence)
+            text = f"{words}\n\n{table(results, settings.confidence)}"
             write_episodes(folder / "episodes.csv", results)
             write_summary(folder / "summary.csv", results, settings.confidence)
             (folder / "table.md").write_text(text + "\n", encoding="utf-8")
@@ -149,7 +151,7 @@ def watch(
             "Q and E turn."
         ),
     ] = "computed_torque",
-    task: TaskName = "track",
+    task: TrainedTask = None,
     path: Annotated[str, typer.Option(help="Name or index of a test path; the first robot's, of several.")] = "0",
     robots: Annotated[int, typer.Option(help="How many, each on a test path of its own.", min=1, max=16)] = 1,
     seed: Annotated[int, typer.Option(help="Seed of the starts.", min=0, max=2**32 - 1)] = 0,
@@ -157,13 +159,15 @@ def watch(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a film that is there.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after that time.")] = None,
 ) -> None:
-    """Show an agent on the test paths of a task, or drive yourself: in a window, or as a film."""
+    """Show an agent on the test paths of a task, a policy on its own, or drive yourself: in a window or a film."""
     with plain_errors():
         from .threads import DEFAULT, limited_to
+        from .trained_task import choose_task
         from .watch import watch as run
 
+        settings, words = choose_task(agent, task)
         with limited_to(DEFAULT):
-            frames = run(agent, task, path, robots, seed, save, overwrite, seconds)
+            frames = run(agent, settings, path, robots, seed, save, overwrite, seconds, begin=lambda: typer.echo(words))
         if save is not None:
             typer.echo(f"{frames} frames are in {save}.")
 

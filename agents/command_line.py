@@ -23,6 +23,13 @@ Changes = Annotated[
     typer.Option("--set", help="Change a setting of the learned agents, e.g. --set steps=100000. May be repeated."),
 ]
 TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
+TrainedTask = Annotated[
+    str | None,
+    typer.Option(
+        help="Name of a task in configs/tasks, or path of a YAML file; without it, the one that the policy was trained "
+        "on, else track."
+    ),
+]
 Threads = Annotated[
     int,
     typer.Option(

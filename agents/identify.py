@@ -119,10 +119,7 @@ def write_example(path: Path, robot: str, seed: int, overwrite: bool) -> str:
 
 
 def write_identification(found: "Identification", recording: Path, settings: IdentifySettings, folder: Path) -> None:
-    """identified.md, identified.csv, identified.png, robot.yaml and run.yaml in a folder.
-
-    features.yaml besides, where zeros, biases or a lag were estimated, which a robot file has no place for.
-    """
+    """identified.md, identified.csv, identified.png, robot.yaml, features.yaml and run.yaml in a folder."""
     from .identify_figures import write_identify_figure  # late: matplotlib takes seconds
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -136,8 +133,7 @@ def write_identification(found: "Identification", recording: Path, settings: Ide
             spread = (found.deviations[k], value - half, value + half) if told[k] else ("", "", "")
             writer.writerow([one.name, one.unit, bool(told[k]), one.start, value, *spread])
     (folder / "robot.yaml").write_text(robot_yaml(found, recording), encoding="utf-8")
-    if features := features_yaml(found, recording):
-        (folder / "features.yaml").write_text(features, encoding="utf-8")
+    (folder / "features.yaml").write_text(features_yaml(found, recording), encoding="utf-8")
     write_provenance(folder, recording=str(recording), settings=settings.model_dump(mode="json"))
     (folder / "identified.md").write_text(page(found, recording), encoding="utf-8")
 
@@ -154,9 +150,9 @@ def robot_yaml(found: "Identification", recording: Path) -> str:
 
 
 def features_yaml(found: "Identification", recording: Path) -> str:
-    """What wrappers make of the estimates that a robot file has no place for; nothing if there are none.
+    """What wrappers make of the estimates that a robot file has no place for: zeros, biases, delay and lag.
 
-    A list for `caster_gym.wrappers.read_features`; what no wrapper has is a comment.
+    A list, which may be empty, for `caster_gym.wrappers.read_features`; what no wrapper has is a comment.
     """
     values = {
         one.name: float(value)
@@ -169,9 +165,12 @@ def features_yaml(found: "Identification", recording: Path) -> str:
         shared = values.get("steering_zero", 0.0)
         zeros = [values.get(f"steering_zero_{i}", shared) for i in range(1, count + 1)]
         features.append({"kind": "steering_offset", "angle": 0.0, "zeros": zeros})
-    if values.get("motor_lag", 0.0) > 0.0:
+    lags = values.get("motor_lag", 0.0) > 0.0
+    if lags:
         features.append({"kind": "motor_lag", "time_constant": values["motor_lag"]})
+    none = {} if lags else {"motor_lag": "motors that follow at once need no wrapper"}
     rest = {
+        **none,
         "torque_delay": "an action_delay of as many control periods comes nearest",
         "heading_zero": "subtract it from what the heading's sensor shows",
         "vx_bias": "subtract it from what the sensor shows",
@@ -181,8 +180,6 @@ def features_yaml(found: "Identification", recording: Path) -> str:
     comments = [
         f"# {name}: {values[name]:.6g} {UNITS[name]}; {words}\n" for name, words in rest.items() if name in values
     ]
-    if not features and not comments:
-        return ""
     header = (
         f"# Sensors and drives of {found.robot.name} as identified from {recording.name}: for caster_gym.wrappers.\n"
     )

@@ -110,6 +110,12 @@ class TaskSettings(ChosenTask):
             return features
         return [{"kind": feature} if isinstance(feature, str) else feature for feature in features]
 
+    @property
+    def described_robot(self) -> Robot:
+        """The robot with its driven joints, as its file says, whatever friction the task's floor has."""
+        robot = load_robot(self.robot)
+        return robot if self.actuation is None else robot.with_actuation(self.actuation)
+
     @model_validator(mode="after")
     def _paths_are_held_out(self) -> Self:
         for kind, paths, other, used in (

@@ -118,7 +118,7 @@ class Run:
             name=self.settings.algorithm.upper(),
             squash=actor.squash,
             hidden=self.settings.hidden,
-            robot=bare(self.validation).robot,
+            robot=self.task.described_robot,
             environment=self.task.environment,
             task=self.task.task,
             wrappers=self.task.wrappers,

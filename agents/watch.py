@@ -1,6 +1,6 @@
 """To look at an agent, or to drive oneself: in a window, or as a film on disk."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -28,7 +28,7 @@ SURROUNDINGS = 14.0  # floor shown around that person's robot, in reaches of it
 
 def watch(
     agent: str,
-    task: str,
+    task: str | TaskSettings,
     path: str | int = 0,
     robots: int = 1,
     seed: int = 0,
@@ -36,12 +36,14 @@ def watch(
     overwrite: bool = False,
     seconds: float | None = None,
     size: tuple[int, int] = SIZE,
+    begin: Callable[[], None] = lambda: None,
 ) -> int:
     """Show an agent on test paths of a task; returns the number of frames shown.
 
-    agent: folder of a policy, name of a model-based agent, or "keyboard". path: index or name of a test path; with
-    several robots, the first of theirs. Without `save`, a window shows episode after episode until it is closed; with
-    it, one episode becomes a film (.mp4 or .gif), a person's drive until the window is closed. seconds: stop then.
+    task: its settings, or the name of its file. agent: folder of a policy, name of a model-based agent, or "keyboard".
+    path: index or name of a test path; with several robots, the first of theirs. Without `save`, a window shows episode
+    after episode until it is closed; with it, one episode becomes a film (.mp4 or .gif), a person's drive until the
+    window is closed. seconds: stop then. begin is called before the first frame.
     Raises ValueError or OSError, before anything runs, for what cannot be shown or saved.
     """
     driving = agent == KEYBOARD
@@ -51,7 +53,7 @@ def watch(
     if (driving or save is None) and not has_display():
         remedy = "" if driving else "; give --save run.mp4 or --save run.gif"
         raise ValueError(f"there is no display to open a window on{remedy}")
-    settings = read_settings(TaskSettings, "tasks", task)
+    settings = task if isinstance(task, TaskSettings) else read_settings(TaskSettings, "tasks", task)
     if driving:
         free = settings.task.model_copy(update={"corridor": FREE})
         settings = settings.model_copy(update={"task": free, "wrappers": ()})  # a person feels no delay on purpose
@@ -75,6 +77,7 @@ def watch(
             tqdm(total=min(end, longest) + 1, unit="frame", desc=controller.name, disable=save is None)
         )
         shown = 0
+        begin()
         for scenes in _scenes(controller, batch, paths, seed, once=save is not None and not driving):
             viewer.show(scenes)
             if viewer.closed:

@@ -1,7 +1,7 @@
 """The floor as it is written in YAML and in Python: one that wheels may slip on. Points are in W."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import Field, PositiveFloat
 
@@ -38,17 +38,20 @@ class Floor(Frozen):
         "discs": "patches",
         "ice": "patches",
     }
-    friction: Annotated[float, Field(gt=0.0, le=GREATEST)] | None = None  # [-] else the robot's own `floor_friction`
+    friction: Friction | None = None  # [-] else the robot's own `floor_friction`
     contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
     patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts
 
 
-def load_floor(floor: str | Floor | Mapping[str, Any]) -> Floor | None:
-    """A floor of finite friction from the mapping in a YAML file, or None for "grip"."""
+FloorLike: TypeAlias = str | Floor | Mapping[str, Any] | None
+
+
+def load_floor(floor: FloorLike) -> Floor | None:
+    """A floor of finite friction from the mapping in a YAML file, or None for "grip" and None."""
     if isinstance(floor, Floor):
         return floor
     if isinstance(floor, Mapping):
         return parse(Floor, floor, "the floor")
-    if floor == "grip":
+    if floor is None or floor == "grip":
         return None
     raise ConfigurationError(f"floor must be 'grip' or a mapping such as {{friction: 0.7}}, got {floor!r}")

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
+from caster_gym.floor import GREATEST
 from caster_gym.plausibility import warn_if_implausible
 
 
@@ -121,6 +122,15 @@ class Footprint(Frozen):
 class Platform(Frozen):
     """The platform without its casters."""
 
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "z": "height",
+        "com_height": "height",
+        "height_of_com": "height",
+        "com_z": "height",
+        "centre_of_mass": "com",
+        "center_of_mass": "com",
+    }
+
     mass: PositiveFloat  # [kg]
     inertia: PositiveFloat  # [kg m²] about a vertical axis through its mass centre
     com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
@@ -131,11 +141,18 @@ class Platform(Frozen):
 class Robot(Frozen):
     """An omnidirectional robot on two or more powered casters."""
 
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "mu": "floor_friction",
+        "friction": "floor_friction",
+        **dict.fromkeys(("height", "z", "com_height"), "it belongs to the 'platform', as {height: 0.1}"),
+    }
+
     name: str
     platform: Platform
     casters: Annotated[tuple[Caster, ...], Field(min_length=2)]
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
-    floor_friction: PositiveFloat = 0.7  # [-] between wheels and floor; tells how much of it is used
+    # [-] between wheels and floor; tells how much of it is used
+    floor_friction: Annotated[float, Field(gt=0.0, le=GREATEST)] = 0.7
     coulomb_speed: PositiveFloat = 0.1  # [rad/s] rate of a joint below which its dry friction fades to zero
 
     @field_validator("actuation", mode="before")

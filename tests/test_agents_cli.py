@@ -169,6 +169,21 @@ def test_a_policy_is_trained_and_then_evaluated(call, tmp_path):
     }
 
 
+def test_a_policy_is_evaluated_on_its_own_task_unless_another_is_asked_for(call, tmp_path):
+    slippery = {**TASK, "task": {"floor": {"friction": 0}}}
+    (tmp_path / "ice.yaml").write_text(yaml.safe_dump(slippery), encoding="utf-8")
+    trained = call("train", "ppo", *TINY, "--task", "ice.yaml", "--out", "run")
+    assert trained.exit_code == 0, trained.output
+    own = call("evaluate", "run/best", "--out", "own")
+    assert own.exit_code == 0, own.output
+    assert own.stdout.startswith(f"Task of {tmp_path / 'run' / 'run.yaml'}, on which the policy was trained.\n")
+    recorded = yaml.safe_load((tmp_path / "own" / "run.yaml").read_text(encoding="utf-8"))
+    assert recorded["task"]["task"]["floor"]["friction"] == 0
+    assert (tmp_path / "own" / "table.md").read_text(encoding="utf-8").startswith("Task of ")
+    other = call("evaluate", "run/best", "--task", "task.yaml", "--out", "other")
+    assert "Task task.yaml; the policy was trained on another one, that of" in other.stdout
+
+
 def test_a_policy_that_does_not_fit_the_task_is_refused(call, tmp_path):
     assert call("train", "ppo", *TINY, "--task", "task.yaml", "--out", "run").exit_code == 0
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({**TASK, "task": {"preview": [0.1]}}), encoding="utf-8")

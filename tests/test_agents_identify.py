@@ -24,10 +24,11 @@ from caster_gym.analysis.recording import read_recording
 from caster_gym.analysis.recording_check import ContradictionError
 from caster_gym.analysis.unknowns import unknowns
 from caster_gym.configuration import ConfigurationError
+from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.robot import load_robot
-from caster_gym.wrappers import read_features
+from caster_gym.wrappers import read_features, wrap
 
-FILES = [".caster-gym", "identified.csv", "identified.md", "identified.png", "robot.yaml", "run.yaml"]
+FILES = [".caster-gym", "features.yaml", "identified.csv", "identified.md", "identified.png", "robot.yaml", "run.yaml"]
 NAMES = ("payload_mass", "scrub")
 
 
@@ -119,7 +120,12 @@ def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
     offset, lag = read_features(yaml.safe_load(text))
     assert (offset.angle, offset.zeros, lag.time_constant) == (0.0, (0.0, 0.02, 0.0), 0.03)
     assert "# torque_delay: 0.004 s" in text
-    assert features_yaml(found, short) == ""
+    none = read_features(yaml.safe_load(features_yaml(found, short)))
+    assert none == ()
+    assert wrap(CasterTrackEnv(found.robot), *none).reset(seed=0)[0].ndim == 1  # as docs/identification.md does
+    at_once = features_yaml(replace(told, estimates=np.array([0.02, 0.0, 0.004])), short)
+    assert len(read_features(yaml.safe_load(at_once))) == 1
+    assert "# motor_lag: 0 s; motors that follow at once need no wrapper" in at_once
 
 
 def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(found, short, tmp_path):

@@ -5,17 +5,21 @@ import re
 
 import pytest
 import stable_baselines3
+import yaml
 from typer.main import get_command
 
 from caster_gym.agents.agent_settings import read_agent
 from caster_gym.agents.cli import app
 from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.floor import Floor
+from caster_gym.robot import Platform, Robot, load_robot
+from caster_gym.wrappers import Friction, read_features
 
 LEARNERS = ("ppo", "ppo_gpu", "sac", "shac")
 INTERNAL = {  # of SB3's constructors, which nobody sets from a command line
@@ -99,12 +103,71 @@ def test_answers_name_fields_and_options_that_exist():
         FollowTask,
         TaskSettings,
         BenchmarkSettings,
+        Arena,
+        Robot,
+        Platform,
+        Friction,
     ):
         known = {*model.model_fields, *TaskSettings.model_fields, *BenchmarkSettings.model_fields, *Floor.model_fields}
+        known |= {*Robot.model_fields, "floor"}
         known |= {"duration", "laps", "seed", "device", "path", "robots"}  # of paths, agents and environments
         for answer in model.usual_names.values():
             assert set(re.findall(r"'(\w+)'", answer)) <= known, answer
             assert set(re.findall(r"(--\w+)", answer)) <= OPTIONS, answer
+
+
+ELSEWHERE = {
+    "impact_law": {"arena": {"impact_law": "stronge"}},
+    "restitution": {"arena": {"restitution": 0.5}},
+    "impact_friction": {"arena": {"friction": 0.2}},
+    "patches": {"floor": {"patches": [{"friction": 0.05, "x": 1.0, "y": 0.0, "radius": 0.4}]}},
+    "contact_time": {"floor": {"friction": 0.3, "contact_time": 0.01}},
+    "mu": {"floor": {"friction": 0.3}},
+    "friction": {"floor": {"friction": 0.3}},
+    "ice": {"floor": {"friction": 0.05}},
+    "slip": {"floor": {"friction": 0.05}},
+}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_keywords_that_belong_inside_of_another_are_sent_there(name):
+    """And what is advised is accepted."""
+    ((keyword, content),) = ELSEWHERE[name].items()
+    with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}'") as error:
+        CasterTrackEnv(path=RANDOM, **{name: 1})
+    assert f"'{keyword}'" in str(error.value)
+    advised = yaml.safe_load(re.search(r"\{.*\}", str(error.value))[0])
+    assert advised == content
+    CasterTrackEnv(path=RANDOM, **{keyword: advised})
+
+
+def test_a_height_is_sent_to_the_platform_of_the_robot():
+    with pytest.raises(TypeError, match="'height'; it belongs to the 'platform' of the 'robot'"):
+        CasterTrackEnv(path=RANDOM, height=0.1)
+    robot = load_robot("chung2008").model_dump(mode="json")
+    with pytest.raises(ConfigurationError, match=r"'height'; it belongs to the 'platform', as \{height: 0.1\}"):
+        load_robot({**robot, "height": 0.1})
+    for name in ("z", "com_height"):
+        with pytest.raises(ConfigurationError, match=f"'platform.{name}'; it is called 'height' here"):
+            load_robot({**robot, "platform": {**robot["platform"], name: 0.1}})
+    assert load_robot({**robot, "platform": {**robot["platform"], "height": 0.1}}).platform.height == 0.1
+
+
+@pytest.mark.parametrize(
+    ("read", "given", "here"),
+    [
+        (read_arena, {"mu": 0.3}, "friction"),
+        (read_arena, {"law": "stronge"}, "impact_law"),
+        (lambda one: read_features([{"kind": "friction", **one}]), {"friction": 0.3}, "floor_friction"),
+        (lambda one: read_features([{"kind": "friction", **one}]), {"mu": 0.3}, "floor_friction"),
+        (lambda one: load_robot({**load_robot("chung2008").model_dump(), **one}), {"mu": 0.3}, "floor_friction"),
+    ],
+)
+def test_usual_names_of_frictions_get_an_answer(read, given, here):
+    ((name, value),) = given.items()
+    with pytest.raises(ConfigurationError, match=f"unknown key '{name}'; it is called '{here}' here"):
+        read(given)
+    read({here: value})
 
 
 def test_keys_of_a_task_are_sent_where_they_belong():

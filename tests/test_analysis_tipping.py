@@ -1,5 +1,6 @@
 """Robots that lift wheels as they drive off."""
 
+import re
 import warnings
 
 import numpy as np
@@ -18,7 +19,7 @@ def standing(name, height):
 
 def test_the_least_load_is_that_of_full_torque_in_the_worst_direction():
     robot = standing("xr4000", 0.12)
-    load, wheel, acceleration, direction = least_load(robot)
+    load, wheel, acceleration, direction, *_ = least_load(robot)
     model = Model(robot)
     torque = np.zeros((144, 8))
     torque[:, ::2] = 4.27  # N m of every rolling motor, which the gear also turns by half against the steering
@@ -49,3 +50,41 @@ def test_a_robot_that_lifts_is_warned_of_and_shipped_ones_are_not():
         warnings.simplefilter("error")
         for name in ("chung2008", "tidybot2", "xr4000"):
             warn_if_lifting(load_robot(name))
+
+
+@pytest.mark.parametrize(("name", "height"), [("chung2008", 0.12), ("chung2008", 0.3), ("xr4000", 0.35)])
+def test_what_the_warning_says_lifts_that_wheel(name, height):
+    """Casters as it says, and all rolling motors forwards or backwards: that wheel loses its load, at that rate."""
+    robot = standing(name, height)
+    robot = robot.model_copy(update={"floor_friction": 5.0})  # holds all that the motors give
+    with pytest.warns(LiftWarning) as caught:
+        warn_if_lifting(robot)
+    told = str(caught[0].message)
+    found = re.search(
+        r"lifts wheel (\d) when it (drives off|brakes while driving) along (-?\d+)° .* by (\S+) m/s²", told
+    )
+    assert found is not None, told
+    model, n = Model(robot), robot.caster_count
+    torque = np.zeros(2 * n)
+    for i, caster in enumerate(robot.casters):
+        pull = caster.roll.max_torque * (1.0 if found[2] == "drives off" else -1.0)
+        torque[2 * i : 2 * i + 2] = pull * np.array(caster.gear[0])  # a motor's torque on the joints that it turns
+    steering = np.full(n, np.radians(float(found[3])))
+    assert (
+        model.wheel_loads(steering, np.zeros(3), torque)[int(found[1]) - 1] < 0.02 * model.wheel_loads(steering).sum()
+    )
+    rate = model.forward_dynamics(steering, np.zeros(3), torque)
+    assert_allclose(np.hypot(rate[0], rate[1]), float(found[4]), rtol=0.06)  # two digits
+
+
+@pytest.mark.parametrize("friction", [0.1, None])
+def test_a_rough_patch_lets_a_robot_lift(friction):
+    """A floor as smooth as ice with a rough patch: the robot lifts a wheel there."""
+    robot = standing("chung2008", 0.12).model_copy(update={"floor_friction": 0.1})
+    smooth = {"friction": friction, "patches": [{"x": 0.0, "y": 0.0, "radius": 50.0, "friction": 0.05}]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LiftWarning)
+        CasterTrackEnv(robot, floor=smooth)
+    rough = {**smooth, "patches": [*smooth["patches"], {"x": 0.0, "y": 0.0, "radius": 50.0, "friction": 2.0}]}
+    with pytest.warns(LiftWarning, match="lifts wheel"):
+        CasterTrackEnv(robot, floor=rough)

@@ -1,5 +1,7 @@
 """A floor of finite friction in the engines: native, tensor and NumPy, one robot and many."""
 
+import re
+
 import numpy as np
 import pytest
 import torch
@@ -8,8 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model, load_robot
 from caster_gym.arena.arena import Arena, Pillar
 from caster_gym.arena.packing import surroundings
+from caster_gym.configuration import ConfigurationError
 from caster_gym.engines.numba_fleet import Fleet
 from caster_gym.engines.torch_fleet import TorchFleet
+from caster_gym.engines.torch_model import TorchModel
 from caster_gym.floor import Floor, Patch
 from tests.random_robots import random_robot
 
@@ -158,7 +162,57 @@ def test_what_has_no_equations_is_refused():
     with pytest.raises(ValueError, match="needs dynamics="):
         Model(robot, "chung2008").simulate(np.zeros(9), np.zeros(6), STEP, 1, floor=Floor())
     fleet = Fleet(robot, floor=Floor())
-    with pytest.raises(ValueError, match=r"state must have shape \(1, 21\), got \(1, 14\)"):
-        fleet.state = np.zeros((1, 14))
     assert fleet.slip.shape == (1, 3, 2)
     assert (Fleet(robot).slip == 0.0).all()
+
+
+@pytest.mark.parametrize("floor", [{"friction": 0.4}, {"friction": 0.4, "patches": [{**ICE.patches[0].model_dump()}]}])
+def test_engines_take_floors_as_environments_do(floor):
+    robot = load_robot("chung2008")
+    state, _, torque = starts(robot, 1)
+    checked = Floor.model_validate(floor)
+    ends = []
+    for make in (Fleet, TorchFleet):
+        for given in (floor, checked):
+            fleet = make(robot, 1, floor=given, **({"dtype": torch.float64} if make is TorchFleet else {}))
+            fleet.state = state if make is Fleet else torch.as_tensor(state)
+            fleet.step(torque if make is Fleet else torch.as_tensor(torque), STEP, 3)
+            ends.append(np.array(fleet.state))
+        assert_array_equal(*ends[-2:])
+        assert make(robot, 1, floor="grip").state.shape == make(robot, 1).state.shape == (1, 13)
+        with pytest.raises(ConfigurationError, match="the floor: unknown key 'mu'; it is called 'friction' here"):
+            make(robot, 1, floor={"mu": 0.3})
+    model, plain = Model(robot), angles_of(state, 3)
+    walks = [model.simulate(plain, torque, STEP, 3, floor=given) for given in (floor, checked)]
+    assert_array_equal(*walks)
+    assert walks[0].shape == (4, 1, 15)
+    assert model.simulate(plain, torque, STEP, 3, floor="grip").shape == (4, 1, 9)
+    with pytest.raises(ConfigurationError, match="floor must be 'grip' or a mapping such as"):
+        model.simulate(plain, torque, STEP, 3, floor="ice")
+
+
+@pytest.mark.parametrize("make", [Fleet, TorchFleet, Model, TorchModel])
+@pytest.mark.parametrize(("casters", "length"), [(3, 5), (3, 14), (2, 30)])
+def test_states_of_a_wrong_length_are_told_all_that_are_right(make, casters, length):
+    """Those that are right on a floor that grips, and on one where wheels may slip."""
+    robot = random_robot(1, casters)
+    fleet = make in (Fleet, TorchFleet)
+    rolling, slipping = (7 + 2 * casters, 9 + 4 * casters) if fleet else (6 + casters, 6 + 3 * casters)
+
+    def said(width, floor):
+        with pytest.raises(ValueError, match="state must have") as error:
+            if fleet:
+                make(robot, 1, floor=floor).state = torch.zeros((1, width)) if make is TorchFleet else [[0.0] * width]
+            else:
+                make(robot).simulate(np.zeros(width), np.zeros(2 * casters), STEP, 1, floor=floor)
+        return str(error.value)
+
+    on_ice = said(length, {"friction": 0.1})
+    assert all(re.search(rf"\b{number}\b", on_ice) for number in (rolling, slipping, length)), on_ice
+    gripping = said(length, "grip")
+    assert f"{rolling}" in gripping
+    assert "floor" not in gripping
+    assert "floor={'friction': 0.7}" in said(slipping, None)
+    if not fleet:  # as the message says
+        walk = make(robot).simulate(np.zeros(slipping), np.zeros(2 * casters), 1e-4, 1, floor={"friction": 0.7})
+        assert walk.shape == (2, slipping)

@@ -214,6 +214,18 @@ def test_a_start_in_motion_rolls():
     assert env.step(np.zeros(6, dtype=np.float32))[4]["wheel_slip"].max() < 1e-9  # it rolls on
 
 
+@pytest.mark.parametrize("actuation", [None, ["roll_1", "steer_1", "roll_2", "steer_2", "roll_3"]])
+def test_a_floor_without_friction_moves_no_robot(actuation):
+    """Whatever the motors do, nothing pushes a platform that stands: wheels spin below it."""
+    env = alone(floor={"friction": 0}, actuation=actuation)
+    env.reset(seed=0, options=STANDING)
+    for _ in range(10):
+        info = env.step(np.resize([1.0, 0.0], env.action_space.shape).astype(np.float32))[4]
+    assert np.hypot(*(info["pose"][:2] - STANDING["pose"][:2])) < 1e-4  # [m]
+    assert info["wheel_slip"][0] > 0.1
+    assert info["traction_use"] <= 1.0 + ROUNDING
+
+
 def test_features_make_the_floor_slippery():
     """The friction of the floor is the robot's number `floor_friction`, which features draw anew in each episode."""
     env = wrap(batch(2, floor={"friction": 0.7}), Friction(floor_friction=0.02))
@@ -322,7 +334,7 @@ def test_the_scene_shows_how_wheels_slip_and_what_the_floor_gives():
     ("floor", "message"),
     [
         ("ice", "'floor'.*'grip'.*got 'ice'"),
-        ({"friction": -0.1}, "'floor.friction'.*greater than 0.*-0.1"),
+        ({"friction": -0.1}, "'floor.friction'.*greater than or equal to 0.*-0.1"),
         ({"mu": 0.3}, "'floor.mu'; it is called 'friction' here"),
         ({"patches": [{"friction": 0.1, "centre": [1.0, 0.0], "radius": 0.2}]}, "centre'.*'x' and 'y'"),
         ({"patches": [{"friction": -0.1, "x": 1.0, "y": 0.0, "radius": 0.2}]}, "'friction' should be .* 0, got -0.1"),

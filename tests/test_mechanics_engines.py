@@ -197,7 +197,7 @@ def test_values_that_are_not_finite_are_refused(bad):
     model = Model(load_robot("chung2008"))
     with pytest.raises(ValueError, match=f"steering must be finite, got {bad}"):
         model.inertia([0.0, bad, 0.0])
-    with pytest.raises(ValueError, match=f"restitution must be finite, got {bad}"):
+    with pytest.raises(ValueError, match=f"restitution must lie in 0 … 1, got {bad}"):
         model.collide(np.zeros(3), np.zeros(3), np.zeros(2), [1.0, 0.0], bad)
 
 
@@ -212,12 +212,31 @@ def test_impossible_impacts_are_refused(published):
     steering, twist, point = np.zeros(3), np.array([-1.0, 0.0, 0.0]), np.zeros(2)
     with pytest.raises(ValueError, match="restitution must lie in 0 … 1, got 2"):
         published.collide(steering, twist, point, [1.0, 0.0], 2.0)
-    with pytest.raises(ValueError, match=r"friction must lie in 0 … inf, got -0\.1"):
-        published.collide(steering, twist, point, [1.0, 0.0], 0.5, -0.1)
+    with pytest.raises(ValueError, match=r"restitution must lie in 0 … 1, got 1\.5$"):
+        published.collide(steering, twist, point, [1.0, 0.0], [0.5, 1.5, 1.0])
+    for wrong in ("x", None, [[0.5], [0.5, 0.5]]):
+        with pytest.raises(ValueError, match="restitution must "):
+            published.collide(steering, twist, point, [1.0, 0.0], wrong)
+        with pytest.raises(ValueError, match="twist must "):
+            published.collide(steering, wrong, point, [1.0, 0.0], 0.5)
+    for wrong in (-0.1, np.inf, np.nan):
+        with pytest.raises(ValueError, match=rf"friction must lie in 0 … 1e\+06, got {wrong}$"):
+            published.collide(steering, twist, point, [1.0, 0.0], 0.5, wrong)
     with pytest.raises(ValueError, match=r"normal must be a unit vector, got a length of 2"):
         published.collide(steering, twist, point, [2.0, 0.0], 0.5)
     with pytest.raises(ValueError, match=r"normal must be a unit vector, got a length of 0.5"):
         published.collide(np.zeros((2, 3)), twist, point, [[1.0, 0.0], [0.5, 0.0]], 0.5)
+
+
+@pytest.mark.parametrize("law", ["stronge", "chatterjee_ruina"])
+def test_a_contact_of_the_greatest_friction_sticks(published, law):
+    """By Stronge its contact point ends at rest along the tangent; by both laws more friction would change nothing."""
+    steering, twist, point = [0.3, 1.0, -2.0], [-1.0, 0.4, 0.2], [-0.3, 0.05]
+    _, after = published.collide(steering, twist, point, [1.0, 0.0], 0.5, 1e6, law)
+    _, less = published.collide(steering, twist, point, [1.0, 0.0], 0.5, 1e4, law)
+    assert_allclose(after, less, atol=1e-3)  # the bend, which goes with the inverse of the friction
+    if law == "stronge":
+        assert abs(float(after[1] + after[2] * point[0])) < 1e-5
 
 
 def test_a_coarse_time_step_names_the_longest_that_would_do(published):

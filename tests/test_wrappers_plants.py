@@ -195,13 +195,24 @@ def test_agents_know_the_nominal_robot():
         ({"kind": "payload", "mass": -1}, "'mass' must not be negative, got -1"),
         ({"kind": "payload", "mass": [2, 1]}, "'mass' must rise from its first to its second number"),
         ({"kind": "payload", "inertia": -1}, "'inertia' should be greater than or equal to 0"),
-        ({"kind": "friction", "floor_friction": 0}, "floor_friction must be positive, got 0"),
+        ({"kind": "friction", "floor_friction": -0.1}, "'floor_friction' must lie in 0 … 1000, .* got -0.1"),
+        ({"kind": "friction", "floor_friction": [0, 1001]}, "'floor_friction' must lie in 0 … 1000"),
         ({"kind": "wheel_errors", "trial": 0.1}, "unknown key 'trial'; did you mean 'trail'"),
     ],
 )
 def test_wrong_numbers_are_refused(feature, message):
     with pytest.raises(ConfigurationError, match=message):
         read_features([feature])
+
+
+def test_a_floor_without_friction_is_one_on_which_wheels_slip():
+    with pytest.raises(
+        ValueError, match=r"floor_friction must be greater than 0 where the floor grips, got 0.*'floor'"
+    ):
+        batch(Friction(floor_friction=0))
+    env = batch(Friction(floor_friction=(0, 1000)), floor={"friction": 0.3})  # as the message says
+    env.reset(seed=0)
+    assert np.isfinite(env.step(env.action_space.sample())[4]["traction_use"]).all()
 
 
 def test_wheels_that_time_steps_cannot_follow_are_refused():

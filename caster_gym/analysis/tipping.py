@@ -2,6 +2,7 @@
 
 import warnings
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +20,23 @@ class LiftWarning(UserWarning):
     """A robot that drives off or brakes at full torque lifts a wheel."""
 
 
+class LeastLoad(NamedTuple):
+    """The least load of a wheel of a robot that drives off or brakes at full torque, and how that comes about."""
+
+    load: float  # [N] negative: the robot tips over
+    wheel: int  # from 1
+    acceleration: float  # [m/s²]
+    direction: float  # [rad] of the acceleration, in B
+    steering: float  # [rad] of all casters: they trail behind a robot that drives along this direction of B
+    brakes: bool  # or drives off
+
+
 @lru_cache(maxsize=128)
-def least_load(robot: Robot) -> tuple[float, int, float, float]:
-    """Least load [N] of a wheel, that wheel (from 1), the acceleration [m/s²] that does it, and its direction [rad].
+def least_load(robot: Robot) -> LeastLoad:
+    """The least load over all directions in which a robot may drive off or brake.
 
     All casters trail in some direction of B, and all rolling motors give their greatest torque forwards, or backwards
-    to brake, or as much as the floor's friction allows the whole robot. A negative load says that the robot tips over.
+    to brake, or as much as the floor's friction allows the whole robot.
     """
     parameters = robot_parameters(robot)
     angles = np.tile(2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS, 2)
@@ -39,17 +51,26 @@ def least_load(robot: Robot) -> tuple[float, int, float, float]:
     loads = np.array(wheel_loads(directions, tilt(still, tuple(rate), directions, still, parameters), parameters))
     wheel, k = np.unravel_index(loads.argmin(), loads.shape)
     ahead, left = rate[:2, k]
-    return float(loads[wheel, k]), int(wheel) + 1, float(np.hypot(ahead, left)), float(np.arctan2(left, ahead))
+    return LeastLoad(
+        float(loads[wheel, k]),
+        int(wheel) + 1,
+        float(np.hypot(ahead, left)),
+        float(np.arctan2(left, ahead)),
+        float(np.remainder(angles[k] + np.pi, 2.0 * np.pi) - np.pi),
+        bool(sense[k] < 0.0),
+    )
 
 
 def warn_if_lifting(robot: Robot) -> None:
     """Warn if a wheel leaves the floor as the robot drives off or brakes at full torque."""
-    load, wheel, acceleration, direction = least_load(robot)
-    if load <= 0.0:
+    least = least_load(robot)
+    if least.load <= 0.0:
+        along = f"along {np.degrees(least.steering):.0f}° with all casters trailing"
+        how = f"brakes while driving {along}" if least.brakes else f"drives off {along}"
         warnings.warn(
             f"robot {robot.name!r}, whose platform has its mass centre {robot.platform.height:g} m above the floor, "
-            f"lifts wheel {wheel} when it accelerates by {acceleration:.2g} m/s² along {np.degrees(direction):.0f}°, "
-            "as its rolling motors and the floor allow; these equations keep all wheels on the floor, and "
+            f"lifts wheel {least.wheel} when it {how}: all rolling motors at full torque, as far as the floor allows, "
+            f"change its velocity by {least.acceleration:.2g} m/s²; these equations keep all wheels on the floor, and "
             'info["wheels_lifted"] tells when they do not stay there',
             LiftWarning,
             stacklevel=3,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, model_validator
 
@@ -131,6 +131,16 @@ class Beside(Frozen):
 
 class Arena(Frozen):
     """What is in the way, and how the robot bounces off it."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {
+        "mu": "friction",
+        "impact_friction": "friction",
+        "coefficient_of_restitution": "restitution",
+        "law": "impact_law",
+        "obstacles": "they stand by their kinds: 'walls', 'pillars', 'polygons', 'half_planes', 'room', 'beside'",
+        "floor_friction": "'friction' is that between hull and obstacles; wheels slip on the 'floor' of the task",
+        "floor": "the 'floor' belongs to the task",
+    }
 
     room: tuple[Point, Point] | None = None  # [m] ((x_min, y_min), (x_max, y_max)): four half-planes
     half_planes: tuple[HalfPlane, ...] = ()

@@ -41,9 +41,9 @@ from caster_gym.engines.memory import check_memory
 from caster_gym.engines.numba_compiler import INLINE, compiled
 from caster_gym.engines.threads import over_blocks
 from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
-from caster_gym.floor import Floor
+from caster_gym.floor import FloorLike, load_floor
 from caster_gym.mechanics.contact import guarded_step
-from caster_gym.mechanics.floor import floor_table, parameters_on
+from caster_gym.mechanics.floor import floor_table, parameters_on, wrong_state
 from caster_gym.mechanics.free_casters import slip_velocity
 from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.integration import pack_state, unpack_state
@@ -173,8 +173,9 @@ class Fleet:
     twist vx, vy, ω in B [m/s, rad/s], then cos δ, sin δ of each caster. around: obstacles, from
     `caster_gym.arena.packing.surroundings`.
 
-    floor: one of finite friction, on which wheels may slip. Then state (count, 9 + 4 N) goes on with η̇, θ̇ of each
-    caster [rad/s] and the tilt that shifts loads [N m]; set to (count, 7 + 2 N), wheels start rolling without slip.
+    floor: one of finite friction, on which wheels may slip, as the environments take it: a `caster_gym.floor.Floor` or
+    a mapping. Then state (count, 9 + 4 N) goes on with η̇, θ̇ of each caster [rad/s] and the tilt that
+    shifts loads [N m]; set to (count, 7 + 2 N), wheels start rolling without slip.
     """
 
     def __init__(
@@ -183,7 +184,7 @@ class Fleet:
         count: int | None = None,
         dynamics: Dynamics = "exact",
         around: Surroundings | None = None,
-        floor: Floor | None = None,
+        floor: FloorLike = None,
     ) -> None:
         if isinstance(robots, Robot):
             check_memory(count or 1, BODY_ROWS + PLATFORM_FIELDS + (4 + CASTER_FIELDS) * robots.caster_count)
@@ -196,13 +197,14 @@ class Fleet:
         self.robots = tuple(listed)
         self.count = len(listed)
         self._casters = tuple(range(sizes.pop()))
-        self._floor = None if floor is None else floor_table(floor)
+        below = load_floor(floor)
+        self._floor = None if below is None else floor_table(below)
         self._torque_row, self._room_row = torque_row(self._casters, self._floor), room_row(self._casters, self._floor)
         among = around is not None and len(around.obstacles.radii) > 0
         self._hull: Hull | None = around.hull if around is not None and among else None
         self._obstacles: Obstacles | None = around.obstacles if around is not None and among else None
         self._distinct = list({id(robot): robot for robot in listed}.values())
-        numbers = [parameters_on(robot, dynamics, floor) for robot in self._distinct]
+        numbers = [parameters_on(robot, dynamics, below) for robot in self._distinct]
         packed = {id(robot): pack_parameters(one) for robot, one in zip(self._distinct, numbers, strict=True)}
         parameters = np.array([packed[id(robot)] for robot in listed])
         self._longest = float(longest_of_robots(self._distinct).min())
@@ -228,6 +230,8 @@ class Fleet:
         state, rolling = np.asarray(value, dtype=np.float64), BODY_ROWS + 2 * len(self._casters)
         if self._floor is not None and state.shape == (self.count, rolling):
             state = self._rolling(self._checked("state", state, rolling))
+        if state.shape != (self.count, self._torque_row):
+            raise ValueError(wrong_state(state.shape, self.count, len(self._casters), self._floor is not None))
         state = self._checked("state", state, self._torque_row)
         pairs = state[:, [2, 3, *range(BODY_ROWS, rolling)]].reshape(self.count, -1, 2)
         length = np.hypot(pairs[..., 0], pairs[..., 1])

@@ -1,6 +1,7 @@
 """The mechanics on NumPy arrays."""
 
 import operator
+import reprlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.engines.time_step import check_rows, check_time_step
-from caster_gym.floor import Floor
+from caster_gym.floor import Floor, FloorLike, load_floor
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.floor import FloorTable, check_floor, floor_table, on_floor, surface_under
@@ -22,6 +23,7 @@ from caster_gym.mechanics.slip import rolling_state
 from caster_gym.robot import Robot, check_joints
 
 Array = NDArray[np.float64]
+ROUGHEST = 1e6  # [-] between hull and obstacles: a contact sticks long before
 
 
 class Model:
@@ -172,7 +174,7 @@ class Model:
         if bool(wrong.any()):
             raise ValueError(f"normal must be a unit vector, got a length of {float(length[wrong][0]) ** 0.5:g}")
         e = self._in_range("restitution", restitution, 0.0, 1.0)
-        mu = self._in_range("friction", friction, 0.0, float("inf"))
+        mu = self._in_range("friction", friction, 0.0, ROUGHEST)
         directions, v = self._directions(steering), self._vector("twist", twist)
         m = dynamics.inertia(directions, self._parameters)
         j_n, j_t, after = impulse.collide(v, m, p, n, e, mu, impulse.LAWS[law])
@@ -186,15 +188,16 @@ class Model:
         steps: int,
         around: Surroundings | None = None,
         *,
-        floor: Floor | None = None,
+        floor: FloorLike = None,
         checked: bool = False,
     ) -> Array:
         """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
 
         torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
         around: obstacles, from `caster_gym.arena.packing.surroundings`, off which the robot bounces.
-        floor: one of finite friction, on which wheels may slip. States are then (steps + 1, ..., 6 + 3 N), with η̇ and θ̇
-        of each caster [rad/s] behind the steering; a state (..., 6 + N) starts rolling. Loads start as at rest.
+        floor: one of finite friction, on which wheels may slip, as the environments take it: a `caster_gym.floor.Floor`
+        or a mapping. States are then (steps + 1, ..., 6 + 3 N), with η̇ and θ̇ of each caster [rad/s] behind
+        the steering; a state (..., 6 + N) starts rolling. Loads start as at rest.
         Angles are continuous in time. Raises ValueError if dt [s] cannot follow the robot, be it of its own numbers or
         of plain ones given in their place; not if the caller has `checked`, or looks for states that are not finite.
         """
@@ -203,8 +206,9 @@ class Model:
         steps = operator.index(steps)
         if steps < 0:
             raise ValueError(f"steps must be 0 or more, got {steps}")
-        n, parameters = self.robot.caster_count, self._on(floor)
-        with_rates = floor is not None and np.shape(state)[-1:] == (6 + 3 * n,)
+        below, n = load_floor(floor), self.robot.caster_count
+        parameters = self._on(below)
+        with_rates = self._with_rates(state, below is not None)
         x, y, beta, *others = self._components("state", state, 6 + (3 * n if with_rates else n))
         twist, steering, rates = (others[0], others[1], others[2]), others[3 : 3 + n], pairs(tuple(others[3 + n :]))
         torques = self._array("torque", torque, 2 * self.robot.caster_count)
@@ -212,10 +216,10 @@ class Model:
         if changing and len(torques) != steps:
             raise ValueError(f"torque must hold {steps} steps along its first axis, got {len(torques)}")
         now = State((x, y), self._unit(beta), twist, tuple(self._unit(angle) for angle in steering))
-        if floor is not None:
+        if below is not None:
             rolling = rolling_state(now, parameters)
             now = rolling._replace(rates=rates) if with_rates else rolling
-        table = None if floor is None else floor_table(floor)
+        table = None if below is None else floor_table(below)
         angles = [beta, *steering]
         states = [self._stack((x, y, beta, *twist, *steering, *flatten(now.rates)))]
         for step in range(steps):
@@ -224,6 +228,19 @@ class Model:
             angles = [self._follow(a, f) for a, f in zip(angles, (now.heading, *now.directions), strict=True)]
             states.append(self._stack((*now.position, angles[0], *now.twist, *angles[1:], *flatten(now.rates))))
         return self._stack(states, 0)
+
+    def _with_rates(self, state: Any, slippery: bool) -> bool:
+        """Whether states hold rates of the casters, as those on a floor of finite friction may."""
+        shape, n = tuple(self._numbers("state", state).shape), self.robot.caster_count
+        if shape[-1:] not in ((6 + n,), (6 + 3 * n,)):
+            longer = f", or of {6 + 3 * n} with yaw and rolling rates of the {n} casters" if slippery else ""
+            raise ValueError(f"state must have a last axis of {6 + n}{longer}, got shape {shape}")
+        if shape[-1] == 6 + 3 * n and not slippery:
+            raise ValueError(
+                f"state must have a last axis of {6 + n}, got shape {shape}: {6 + 3 * n} numbers are a state on a "
+                "floor of finite friction, such as floor={'friction': 0.7}"
+            )
+        return bool(shape[-1] == 6 + 3 * n)
 
     def _check_time_step(self, dt: float) -> None:
         if self._rows is None:
@@ -262,11 +279,18 @@ class Model:
 
     def _array(self, name: str, value: Any, last: int) -> Any:
         """The value as an array of finite numbers whose last axis has the right length."""
-        array = np.asarray(value, dtype=np.float64)
+        array = self._numbers(name, value)
         self._check_shape(name, array, last)
         if not np.isfinite(array).all():
             raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
         return array
+
+    def _numbers(self, name: str, value: Any) -> Any:
+        """The value as an array."""
+        try:
+            return np.asarray(value, dtype=np.float64)
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"{name} must hold real numbers, got {reprlib.repr(value)}") from error
 
     @staticmethod
     def _check_shape(name: str, array: Any, last: int) -> None:
@@ -294,11 +318,10 @@ class Model:
         return pairs(self._components("torque", torque, 2 * self.robot.caster_count))
 
     def _in_range(self, name: str, value: Any, low: float, high: float) -> Any:
-        number = self._array(name, self._arrays.asarray(value)[..., None], 1)[..., 0]
-        if bool(((number < low) | (number > high)).any()):
-            raise ValueError(
-                f"{name} must lie in {low:g} … {high:g}, got {float(number.min()):g} … {float(number.max()):g}"
-            )
+        number = self._numbers(name, value)
+        wrong = ~((number >= low) & (number <= high))  # so that what is no number is wrong too
+        if bool(wrong.any()):
+            raise ValueError(f"{name} must lie in {low:g} … {high:g}, got {float(number[wrong][0]):g}")
         return number
 
     def _follow(self, angle: Any, f: Direction) -> Any:

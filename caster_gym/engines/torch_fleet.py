@@ -17,8 +17,8 @@ from caster_gym.engines.torch_scalars import (
     parameter_rows,
     parameters_of,
 )
-from caster_gym.floor import Floor
-from caster_gym.mechanics.floor import FloorTable, check_floor, floor_table, on_floor, surface_under
+from caster_gym.floor import FloorLike, load_floor
+from caster_gym.mechanics.floor import FloorTable, check_floor, floor_table, on_floor, surface_under, wrong_state
 from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
@@ -36,8 +36,9 @@ class TorchFleet:
     robots: one Robot for all, or one for each. state (count, 7 + 2 N): x, y [m], cos β, sin β in the world,
     twist vx, vy, ω in B [m/s, rad/s], then cos δ, sin δ of each caster.
 
-    floor: one of finite friction, on which wheels may slip. Then state (count, 9 + 4 N) goes on with η̇, θ̇ of each
-    caster [rad/s] and the tilt that shifts loads [N m]; set to (count, 7 + 2 N), wheels start rolling without slip.
+    floor: one of finite friction, on which wheels may slip, as the environments take it: a `caster_gym.floor.Floor` or
+    a mapping. Then state (count, 9 + 4 N) goes on with η̇, θ̇ of each caster [rad/s] and the tilt that
+    shifts loads [N m]; set to (count, 7 + 2 N), wheels start rolling without slip.
 
     compile fuses a step into one kernel: the first step then takes a minute, or some seconds where Torch's cache on
     disk has it. On a CUDA device its kernels are replayed as a graph, without gradients. Otherwise gradients pass
@@ -54,7 +55,7 @@ class TorchFleet:
         dynamics: Dynamics = "exact",
         *,
         parameters: RobotParameters | None = None,
-        floor: Floor | None = None,
+        floor: FloorLike = None,
         device: torch.device | str = "cpu",
         dtype: torch.dtype = torch.float32,
         compile: bool = False,
@@ -68,18 +69,19 @@ class TorchFleet:
         self._longest = float(longest_of_robots(self._distinct).min())
         n = self._distinct[0].caster_count
         self._torque_rows, self._rolling_rows = 2 * n, BODY_ROWS + 2 * n
-        self._rows = self._rolling_rows if floor is None else self._rolling_rows + 2 * n + 2
+        below = load_floor(floor)
+        self._rows = self._rolling_rows if below is None else self._rolling_rows + 2 * n + 2
         if parameters is not None:
             self._parameters = parameters
         elif len(self._distinct) == 1:
             self._parameters = robot_parameters(self._distinct[0], dynamics)  # plain numbers, which the compiler folds
         else:
             self._parameters = parameters_of(parameter_rows(self.robots, self.dtype, self.device, dynamics))
-        self._floor = None if floor is None else _listed(floor_table(floor))
-        if floor is not None:
+        self._floor = None if below is None else _listed(floor_table(below))
+        if below is not None:
             for robot in self._distinct:
                 check_floor(robot, dynamics)
-            self._parameters = on_floor(self._parameters, floor)
+            self._parameters = on_floor(self._parameters, below)
         self._step: Callable[..., Any] = compiled(_step, self.device, self.device.type == "cuda") if compile else _step
         if compile and self.device.type == "cuda":
             self._step = replayed(self._step)
@@ -98,6 +100,9 @@ class TorchFleet:
         tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)
         if self._floor is not None and tensor.shape == (self.count, self._rolling_rows):
             tensor = torch.stack(torch.broadcast_tensors(*self._rolling(tensor)), 1)  # type: ignore[no-untyped-call]
+        if tensor.shape != (self.count, self._rows):
+            n, slippery = self._torque_rows // 2, self._floor is not None
+            raise ValueError(wrong_state(tuple(tensor.shape), self.count, n, slippery))
         self._state = self._checked("state", tensor, self._rows).T.contiguous()
 
     def _rolling(self, state: Tensor) -> tuple[Tensor, ...]:

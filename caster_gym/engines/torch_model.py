@@ -1,5 +1,6 @@
 """The mechanics on Torch tensors, eagerly and with gradients."""
 
+import reprlib
 from typing import Any
 
 import torch
@@ -35,9 +36,15 @@ class TorchModel(Model):
         """Numbers given in place of the robot's own may be tensors whose values nobody may ask for."""
 
     def _array(self, name: str, value: Any, last: int) -> Any:
-        tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)
+        tensor = self._numbers(name, value)
         self._check_shape(name, tensor, last)
         return tensor
+
+    def _numbers(self, name: str, value: Any) -> Any:
+        try:
+            return torch.as_tensor(value, dtype=self.dtype, device=self.device)
+        except (ValueError, TypeError, RuntimeError) as error:  # the last of None, whose type it cannot infer
+            raise ValueError(f"{name} must hold real numbers, got {reprlib.repr(value)}") from error
 
     def _scalar(self, value: Any) -> Any:
         return value

@@ -54,7 +54,7 @@ class CasterTrackEnv(CasterEnv):
     | reward_terms | the terms above, by name | – |
     | torque | mean torque of each of the 2 N motors over the control period, 0 where a joint is not driven | N m |
     | power | mean mechanical power of all motors over the control period | W |
-    | traction_use | greatest share of the floor's friction that a wheel uses in the period; above 1 it would slip | – |
+    | traction_use | greatest share of friction used; above 1 a wheel would slip; at most 1 where wheels may slip | – |
     | wheel_slip | greatest speed of each wheel over the floor; only there where wheels may slip, see Floor | m/s |
     | wheels_lifted | most wheels at once that a push, an acceleration or a load lifts off the floor | – |
     | conditioning | σ_min/σ_max of the driven motors' wrenches, 0 where they cannot push the robot somewhere | – |

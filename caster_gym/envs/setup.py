@@ -28,7 +28,7 @@ from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.floor import Floor
-from caster_gym.mechanics.floor import check_slips
+from caster_gym.mechanics.floor import check_slips, robot_on, where_it_grips_most
 from caster_gym.mechanics.separation import Surroundings
 from caster_gym.paths.specification import AnyPath, build_trajectories, read_paths
 from caster_gym.paths.specification import PathLike as PathLike
@@ -169,14 +169,13 @@ def _arenas(
 def _chosen(robot: RobotLike, actuation: Actuation, floor: Floor | None) -> Robot:
     """The robot with its driven joints, and on a floor of finite friction with that friction."""
     chosen = load_robot(robot)
-    if floor is not None:
-        check_slips(chosen)
-    if floor is not None and floor.friction is not None:
-        chosen = chosen.model_copy(update={"floor_friction": floor.friction})
     if actuation is not None:
         chosen = chosen.with_actuation(actuation if isinstance(actuation, str) else tuple(actuation))
+    if floor is not None:
+        check_slips(chosen)
+        chosen = robot_on(chosen, floor)
     warn_if_singular(chosen)
-    warn_if_lifting(chosen)
+    warn_if_lifting(chosen if floor is None else where_it_grips_most(chosen, floor))
     return chosen
 
 

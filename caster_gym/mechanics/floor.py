@@ -47,6 +47,17 @@ def on_floor(robot: RobotParameters, floor: Floor) -> RobotParameters:
     return robot._replace(platform=robot.platform._replace(floor_friction=friction))
 
 
+def robot_on(robot: Robot, floor: Floor) -> Robot:
+    """The same of a robot as it is described; a floor may have no friction at all, which is no robot's own."""
+    return robot if floor.friction is None else robot.model_copy(update={"floor_friction": floor.friction})
+
+
+def where_it_grips_most(robot: Robot, floor: Floor) -> Robot:
+    """A robot where the floor has its greatest friction, be it that of a patch."""
+    greatest = max((robot_on(robot, floor).floor_friction, *(patch.friction for patch in floor.patches)))
+    return robot.model_copy(update={"floor_friction": greatest})
+
+
 def check_slips(robot: Robot) -> None:
     """Refuse a robot whose casters have no inertia of their own: nothing would hold a wheel that slips."""
     for number, caster in enumerate(robot.casters, start=1):
@@ -74,6 +85,19 @@ def parameters_on(robot: Robot, dynamics: Dynamics, floor: Floor | None) -> Robo
         return robot_parameters(robot, dynamics)
     check_floor(robot, dynamics)
     return on_floor(robot_parameters(robot), floor)
+
+
+def wrong_state(shape: tuple[int, ...], count: int, casters: int, slippery: bool) -> str:
+    """What to say of states whose shape no fleet of so many robots has."""
+    rolling, slipping = (count, 7 + 2 * casters), (count, 9 + 4 * casters)
+    if slippery:
+        return f"state must have shape {slipping}, or {rolling} of wheels that start rolling, got {shape}"
+    if shape == slipping:
+        return (
+            f"state must have shape {rolling}, got {shape}, which is that of states on a floor of finite friction, "
+            "such as floor={'friction': 0.7}"
+        )
+    return f"state must have shape {rolling}, got {shape}"
 
 
 def surface_under(state: State, robot: RobotParameters, floor: FloorTable | None) -> Surface | None:

@@ -4,12 +4,14 @@ Only the plant changes; agents know the nominal robot. Parameters are rows (k, f
 `caster_gym.mechanics.parameters.pack_parameters`.
 """
 
-from typing import Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import NonNegativeFloat, model_validator
+from pydantic import AfterValidator, NonNegativeFloat
 
+from caster_gym.floor import GREATEST
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
     PLATFORM_FIELDS,
@@ -50,24 +52,35 @@ class Payload(Feature):
         return _Payload(self)
 
 
+def _of_a_floor(value: float | tuple[float, float]) -> float | tuple[float, float]:
+    low, high = limits(value)
+    if low < 0.0 or high > GREATEST:
+        raise ValueError(f"must lie in 0 … {GREATEST:g}, as a floor's friction does")
+    return value
+
+
+OfAFloor: TypeAlias = Annotated[Range, AfterValidator(_of_a_floor)]
+
+
 class Friction(Feature):
     """Other friction in each joint, drawn joint by joint, and another floor."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {"friction": "floor_friction", "mu": "floor_friction"}
 
     kind: Literal["friction"] = "friction"
     viscous_scale: Size = 1.0  # [-] of the joints' own viscous friction
     coulomb_scale: Size = 1.0  # [-] of the joints' own dry friction
     added_viscous: Size = 0.0  # [N m s/rad] on top, in every joint
     added_coulomb: Size = 0.0  # [N m] on top, in every joint
-    floor_friction: Size | None = None  # [-] between wheels and floor; null: the robot's own
-
-    @model_validator(mode="after")
-    def _floor_holds(self) -> Self:
-        if self.floor_friction is not None and limits(self.floor_friction)[0] <= 0.0:
-            raise ValueError(f"floor_friction must be positive, got {self.floor_friction}")
-        return self
+    floor_friction: OfAFloor | None = None  # [-] between wheels and floor; null: the robot's own
 
     def runtime(self, place: Place) -> Runtime:
-        """Joints and floors with other friction."""
+        """Joints and floors with other friction. Raises ValueError for a floor that grips without friction."""
+        if self.floor_friction is not None and limits(self.floor_friction)[0] == 0.0 and place.task.slippery is None:
+            raise ValueError(
+                f"floor_friction must be greater than 0 where the floor grips, got {self.floor_friction}, since "
+                "'traction_use' is a share of it; let wheels slip by the task's 'floor', such as {friction: 0.3}"
+            )
         return _Friction(self, place)
 
 
