@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat
 
 from caster_gym.configuration import ConfigurationError, Frozen, parse
 
-GREATEST = 1e3  # [-] far above any floor; wheels then roll as if they could not slip
+GREATEST = 1e3  # [-] far above any floor; wheels then roll as if they could not slip, as long as none lifts
 
 Friction = Annotated[float, Field(ge=0.0, le=GREATEST)]
 

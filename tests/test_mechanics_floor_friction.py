@@ -7,12 +7,14 @@ from caster_gym import load_robot
 from caster_gym.mechanics import floor_friction, slip
 from caster_gym.mechanics.floor_friction import (
     Footing,
+    Grip,
     final_impulses,
     grip,
     impulse_limit,
     newton_round,
     sliding,
     unheld_velocity,
+    used_share,
 )
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
@@ -35,7 +37,7 @@ def draw(seed, wheels):
         free = before + rng.normal(size=2) * rng.choice((1e-3, 0.1, 0.5))
         rows = rng.normal(size=(2, 3))
         footings.append(Footing(tuple(free), tuple(map(tuple, rows)), (k[0, 0], k[0, 1], k[1, 1])))
-        limits.append(impulse_limit(rng.choice((0.0, 0.05, 0.5, 5.0)) * rng.uniform(0.5, 1.5)))
+        limits.append(impulse_limit(1.0, rng.choice((0.0, 0.05, 0.5, 5.0)) * rng.uniform(0.5, 1.5)))
         slides.append(sliding(tuple(before), limits[-1]))
     upper = tuple(inertia[np.triu_indices(3)])
     problem = (upper, tuple(rng.normal(size=3)), tuple(footings), tuple(limits))
@@ -112,7 +114,7 @@ def test_stiffness_is_the_derivative_of_the_impulse():
     """(S13): by central differences of the impulse of a wheel that is held, and of one that slides."""
     footing = Footing((0.3, -0.4), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (0.4, 0.1, 0.3))
     for most, slide in ((10.0, 0.0), (0.2, 1.0)):
-        limit = impulse_limit(most)
+        limit = impulse_limit(1.0, most)
 
         def impulse(x, y, limit=limit, slide=slide):
             for _ in range(12):
@@ -178,3 +180,14 @@ def test_two_rounds_suffice_for_robots_that_slip_in_every_way(monkeypatch):
     assert np.median(left) < 1e-11  # [m/s]
     assert np.quantile(left, 0.99) < 3e-5
     assert max(left) < 2e-3
+
+
+def test_a_wheel_uses_no_more_than_all():
+    """Not even by rounding."""
+    angles = np.random.default_rng(9).uniform(-np.pi, np.pi, 10_000)
+    limit = impulse_limit(1.0, 0.3)
+    impulses = 0.3 * np.cos(angles), 0.3 * np.sin(angles)
+    assert (np.hypot(*impulses) * limit.inverse).max() > 1.0  # so there is rounding to be cut
+    uses = used_share(Grip(impulses, 0.0 * angles, (0.0 * angles,) * 3), limit)
+    assert uses.max() == 1.0
+    assert uses.min() > 1.0 - 1e-12

@@ -38,6 +38,7 @@ from caster_gym.mechanics import (
     scalars,
     separation,
     slip,
+    slip_energy,
     slip_impact,
     slip_tilt,
 )
@@ -132,6 +133,7 @@ for _module in (
     floor,
     slip,
     slip_impact,
+    slip_energy,
     slip_tilt,
     grip_or_slip,
 ):

@@ -26,7 +26,8 @@ from caster_gym.mechanics.scalars import (
     where,
 )
 
-LEAST_LIMIT = 1e-6  # [N s] of a wheel without load: as good as nothing, and its inverse is still a number
+LEAST_FORCE = 1e-6  # [N] that holds a wheel without load: as good as nothing, and the inverse is still a number
+NO_TIME = 1e-9  # [s] robots of a batch that have nothing left of their step stay where they are, with finite limits
 TINY = 1e-30  # keeps a quotient of two numbers that vanish together a number
 
 
@@ -57,9 +58,9 @@ class Grip(NamedTuple):
     stiffness: tuple[Scalar, Scalar, Scalar]  # −dP/du, in the order of K [kg]
 
 
-def impulse_limit(most: Scalar) -> Limit:
-    """The limit as the solve takes it."""
-    some = maximum(most, LEAST_LIMIT + 0.0 * most)
+def impulse_limit(time: Scalar, force: Scalar) -> Limit:
+    """The limit as the solve takes it, for a force that the floor can hold over some seconds."""
+    some = maximum(time, NO_TIME) * maximum(force, LEAST_FORCE + 0.0 * force)
     return Limit(some, 1.0 / some)
 
 
@@ -131,7 +132,8 @@ def slide_of(wheel: Grip) -> Scalar:
 def used_share(wheel: Grip, limit: Limit) -> Scalar:
     """Share of the greatest impulse that a wheel takes. [-]"""
     p, q = wheel.impulse
-    return sqrt(p * p + q * q) * limit.inverse
+    use = sqrt(p * p + q * q) * limit.inverse
+    return clip(use, 0.0 * use, 1.0 + 0.0 * use)  # rounding may leave a little more than 1
 
 
 def newton_round(
@@ -171,10 +173,15 @@ def lessened(share: Scalar, wheel: Grip) -> Grip:
 
 def cut_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
     """Impulses within their limits at a change of the twist that was found, and the change that they do make."""
-    inertia, force, footings, limits = problem
+    _, _, footings, limits = problem
     grips = each(grip, (change, 0.0), footings, limits, slides)
-    given = add(force, total(each(floor_wrench, (), footings, grips)))
-    return substitute(factors(inertia), given), grips
+    return impulses_change(problem, grips), grips
+
+
+def impulses_change(problem: Problem, grips: tuple[Grip, ...]) -> Vector:
+    """Change of the twist that impulses make."""
+    inertia, force, footings, _ = problem
+    return substitute(factors(inertia), add(force, total(each(floor_wrench, (), footings, grips))))
 
 
 def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:

@@ -10,6 +10,7 @@ from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.caster_masses import friction_slopes, implicit_shares
 from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
 from caster_gym.mechanics.floor_friction import (
+    NO_TIME,
     TINY,
     Footing,
     Grip,
@@ -18,6 +19,8 @@ from caster_gym.mechanics.floor_friction import (
     final_impulses,
     floor_stiffness,
     impulse_limit,
+    impulses_change,
+    lessened,
     newton_round,
     sliding,
     used_share,
@@ -52,9 +55,12 @@ from caster_gym.mechanics.scalars import (
     each,
     maximum,
     pairs,
+    sqrt,
     total,
+    where,
 )
-from caster_gym.mechanics.slip_tilt import NO_TIME, tilt_after
+from caster_gym.mechanics.slip_energy import explained_share
+from caster_gym.mechanics.slip_tilt import tilt_after
 
 Pair = tuple[Scalar, Scalar]
 
@@ -207,14 +213,15 @@ def rates_after(change: Vector, grips: tuple[Grip, ...], part: Stage, robot: Rob
     return each(follow, (change,), each(pushed, (), part.free, answers), part.edges)
 
 
-def pressing(load: Scalar) -> Scalar:
-    """A load that is not negative. [N]"""
-    return maximum(load, 0.0 * load)
+def lasting_load(before: Scalar, load: Scalar) -> Scalar:
+    """A load that is not negative, and zero for a wheel that had none half a step before. [N]"""
+    nothing = 0.0 * load
+    return where(before > 0.0, maximum(load, nothing), nothing)
 
 
 def limit_of(time: Scalar, friction: Scalar, load: Scalar) -> Limit:
     """Greatest impulse of the floor on a wheel over some seconds."""
-    return impulse_limit(time * friction * load)
+    return impulse_limit(time, friction * load)
 
 
 def slower(before: Limit, after: Limit, slide: Scalar) -> Scalar:
@@ -260,6 +267,24 @@ def with_velocities(state: State, twist: Vector, rates: tuple[Pair, ...], tilt: 
     return State(state.position, state.heading, twist, state.directions, rates, tilt)
 
 
+def within(wheel: Grip, limit: Limit) -> Grip:
+    """A wheel of the half step whose impulse is no more than half of what the whole step allows."""
+    p, q = wheel.impulse
+    one = 1.0 + 0.0 * p
+    share = 1.0 / maximum(one, 2.0 * sqrt(p * p + q * q) * limit.inverse)
+    return lessened(share, wheel)
+
+
+def slowed(share: Scalar, v: Vector, before: Vector) -> Vector:
+    """Change of a twist to a share of what it is."""
+    return share * v[0] - before[0], share * v[1] - before[1], share * v[2] - before[2]
+
+
+def slowed_rates(share: Scalar, rates: Pair) -> Pair:
+    """A share of a caster's rates."""
+    return share * rates[0], share * rates[1]
+
+
 def mean_force(rate: Scalar, wheel: Grip) -> Pair:
     """Force of the floor on a wheel along f and f⊥. [N]"""
     return rate * wheel.impulse[0], rate * wheel.impulse[1]
@@ -278,7 +303,8 @@ def slip_step(
     half = 0.5 * h
     there = moved(half, state, state)
     part = stage(half, state, state, there.directions, nothing, torques, wrench, robot)
-    limits = each(limit_of, (half,), frictions, wheel_loads(state.directions, state.tilt, robot))
+    first_loads = wheel_loads(state.directions, state.tilt, robot)
+    limits = each(limit_of, (half,), frictions, first_loads)
     slips = each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters)
     slides = each(sliding, (), slips, limits)
     change = nothing
@@ -289,14 +315,18 @@ def slip_step(
     rates = rates_after(change, grips, part, robot)
     middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
     tilted = tilt_after(change, rates, state, middle, half, wrench, robot)
+    loads = each(lasting_load, (), first_loads, wheel_loads(there.directions, tilted, robot))
+    before, limits = limits, each(limit_of, (h,), frictions, loads)
+    grips = each(within, (), grips, limits)
+    change = impulses_change(problem, grips)
+    rates = rates_after(change, grips, part, robot)
+    middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
     end = moved(h, state, middle)
     known = turning_lag(grips, 2.0, middle.directions, end.directions, robot)
     part = stage(h, state, middle, end.directions, known, torques, wrench, robot)
     halfway = each(slip_velocity, (middle.twist,), middle.directions, rates, robot.casters)
     against = each(lasting_slide, (), slips, halfway, each(free_of, (), part.footings))
     footings = each(opposing, (), part.footings, against)
-    loads = wheel_loads(middle.directions, tilted, robot)
-    before, limits = limits, each(limit_of, (h,), frictions, loads)
     slides = each(slower, (), before, limits, slides)
     change = (2.0 * change[0], 2.0 * change[1], 2.0 * change[2])
     problem = part.inertia, part.force, footings, limits
@@ -304,9 +334,11 @@ def slip_step(
     change, slides = newton_round(change, 0.0, problem, slides)
     change, grips = final_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
+    share = explained_share(h, state, change, rates, end.directions, torques, wrench, robot)
+    change, rates = slowed(share, add(state.twist, change), state.twist), each(slowed_rates, (share,), rates)
     tilted = tilt_after(change, rates, state, middle, h, wrench, robot)
     end = with_velocities(end, add(state.twist, change), rates, tilted)
     slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
     answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))
     forces, uses = each(mean_force, (1.0 / maximum(h, NO_TIME),), grips), each(used_share, (), grips, limits)
-    return end, Footfall(slips, forces, each(pressing, (), loads), uses, answer)
+    return end, Footfall(slips, forces, loads, uses, answer)

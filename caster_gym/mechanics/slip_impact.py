@@ -53,15 +53,11 @@ class ImpactFooting(NamedTuple):
     edges: tuple[Border, ...]
 
 
-def scaled_load(contact_time: Scalar, friction: Scalar, load: Scalar) -> Scalar:
-    """What the floor can hold over the contact time. [N s]"""
-    return contact_time * friction * load
-
-
-def fading_limit(most: Scalar, u: Pair) -> Limit:
-    """Greatest impulse of the floor on a wheel; none on one that slides already."""
+def fading_limit(contact_time: Scalar, friction: Scalar, load: Scalar, u: Pair) -> Limit:
+    """Greatest impulse of the floor on a wheel over the contact time; none on one that slides already."""
     slides = sqrt(u[0] * u[0] + u[1] * u[1])
-    return impulse_limit(most * clip(2.0 - slides / RESTING, 0.0 * slides, 1.0 + 0.0 * slides))  # (S15)
+    fades = clip(2.0 - slides / RESTING, 0.0 * slides, 1.0 + 0.0 * slides)
+    return impulse_limit(contact_time, friction * load * fades)  # (S15)
 
 
 def held_at_first(limit: Limit) -> Scalar:
@@ -76,8 +72,7 @@ def impact_footing(state: State, surface: Surface, robot: RobotParameters) -> Im
     before = slips_of(state, robot)
     rows = each(floor_rows, (), state.directions, edges, robot.casters)
     loads = wheel_loads(state.directions, state.tilt, robot)
-    most = each(scaled_load, (surface.contact_time,), surface.frictions, loads)
-    limits = each(fading_limit, (), most, before)
+    limits = each(fading_limit, (surface.contact_time,), surface.frictions, loads, before)
     return ImpactFooting(
         add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges))),
         each(footing, (), before, rows, each(floor_mobility, (), owns, robot.casters)),

@@ -1,14 +1,13 @@
 """How a robot whose wheels may slip tilts onto some of them as it moves. docs/equations.md, section S."""
 
 from caster_gym.mechanics.caster import pivot_velocity
+from caster_gym.mechanics.floor_friction import NO_TIME
 from caster_gym.mechanics.free_casters import Pair, pivot_rows
 from caster_gym.mechanics.ground import platform_tilt
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.linear import dot
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, maximum, total
-
-NO_TIME = 1e-9  # [s] robots of a batch that have nothing left of their step stay where they are, with finite loads
 
 
 def caster_motion(rate: Scalar, before: Pair, after: Pair, now: Pair) -> tuple[Pair, Pair]:
