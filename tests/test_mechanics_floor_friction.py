@@ -73,7 +73,7 @@ def off_the_law(change, grips, problem):
 
 @pytest.mark.parametrize("wheels", CASTER_COUNTS)
 def test_impulses_obey_coulombs_law(wheels):
-    """(S11), (S12), (S13)"""
+    """(S12), (S13), (S14)"""
     for seed in range(60):
         problem, slides = draw(seed, wheels)
         change, grips = solved(problem, slides, ROUNDS)
@@ -111,7 +111,7 @@ def grip_without(footing):
 
 
 def test_stiffness_is_the_derivative_of_the_impulse():
-    """(S13): by central differences of the impulse of a wheel that is held, and of one that slides."""
+    """(S14): by central differences of the impulse of a wheel that is held, and of one that slides."""
     footing = Footing((0.3, -0.4), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (0.4, 0.1, 0.3))
     for most, slide in ((10.0, 0.0), (0.2, 1.0)):
         limit = impulse_limit(1.0, most)

@@ -152,7 +152,7 @@ def many_slides(robot, frictions, starts):
 @pytest.mark.parametrize("height", [0.0, 0.1, 0.3, 0.6])
 @pytest.mark.parametrize("name", [*ROBOTS, 3, 4, 5])
 def test_energy_never_rises_where_wheels_lift(name, height):
-    """On floors from ice to glue, of robots as tall as they like."""
+    """(S11): on floors from ice to glue, of robots as tall as they like."""
     robot = frictionless(random_robot(3, name) if isinstance(name, int) else load_robot(name))
     numbers = robot_parameters(robot)
     numbers = numbers._replace(platform=numbers.platform._replace(height=height))
@@ -359,7 +359,7 @@ def test_directions_keep_their_length():
 
 
 def test_a_slide_that_lasts_is_of_second_order():
-    """(S14): on ice, where no wheel is ever held. Where the robot is; the loads' lag leaves a little in the rates."""
+    """(S15): on ice, where no wheel is ever held. Where the robot is; the loads' lag leaves a little in the rates."""
     robot = frictionless(random_robot(7, 4))
     numbers, (steering, twist, *_) = robot_parameters(robot), random_motion(7, robot)
     start = rolling(numbers, steering, twist)._replace(rates=((5.0, 40.0), (-4.0, -30.0), (3.0, 50.0), (-5.0, 60.0)))

@@ -55,7 +55,7 @@ def struck(name, seed, friction, contact_time, **how):
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_floor_that_holds_everything_makes_the_impact_of_rolling_wheels(name, seed):
-    """(S15) with a great limit: the impulse, the twist after it, and wheels that still roll."""
+    """(S16) with a great limit: the impulse, the twist after it, and wheels that still roll."""
     _, _, numbers, _, after, hits, used = struck(name, seed, 1e3, 1.0)
     _, _, rolling, hull, obstacles = met(name, seed)
     expected, pressure, _ = impact(rolling, 0.5, numbers, hull, obstacles, 0, 1, None)
@@ -71,7 +71,7 @@ def test_a_floor_that_holds_everything_makes_the_impact_of_rolling_wheels(name, 
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("seed", range(4))
 def test_without_a_floor_the_casters_answer_freely(name, seed):
-    """(S15) with no limit: a flush hit without turning meets the inertia that Kane's free bodies have."""
+    """(S16) with no limit: a flush hit without turning meets the inertia that Kane's free bodies have."""
     robot, steering, _, before, after, hits, _ = struck(name, seed, 1e-6, 1e-3)
     answer = FreeKane(robot).inertia_beside(steering)
     change = np.linalg.solve(answer, hits.wrench)
@@ -145,7 +145,7 @@ def test_an_impact_is_that_of_a_force_over_the_contact_time(name):
 
 
 def test_a_wheel_that_slides_is_not_held_by_the_impact():
-    """(S15): its friction acts over the time step anyway, and would be counted twice."""
+    """(S16): its friction acts over the time step anyway, and would be counted twice."""
     robot, _, rolling, hull, obstacles = met("tidybot2", 1, restitution=0.0)
     numbers = parameters_on(robot, "exact", Floor(friction=0.7))
     state = rolling_state(rolling, numbers)

@@ -85,15 +85,15 @@ def grip(change: Vector, caution: Scalar, footing: Footing, limit: Limit, slide:
     px, py = fp * wy - c * wx, fp * wx - a * wy  # P times the determinant: fewer quotients
     square = px * px + py * py
     answer = maximum(px * (c * px - fp * py) + py * (a * py - fp * px), TINY)
-    rho = slide + square * (sqrt(square) * limit.inverse - (a * c - fp * fp)) / answer  # (S12)
+    rho = slide + square * (sqrt(square) * limit.inverse - (a * c - fp * fp)) / answer  # (S13)
     rho = maximum(rho, 0.0 * rho)
     a, c = ff + rho, pp + rho
     px, py = fp * wy - c * wx, fp * wx - a * wy
-    scale = 1.0 / maximum(a * c - fp * fp, sqrt(px * px + py * py) * limit.inverse)  # (S11)
+    scale = 1.0 / maximum(a * c - fp * fp, sqrt(px * px + py * py) * limit.inverse)  # (S12)
     across = (1.0 - caution) / maximum(a * py * py - 2.0 * fp * px * py + c * px * px, TINY)
     kept = caution * scale
     slides = rho > 0.0
-    stiffness = (  # (S13)
+    stiffness = (  # (S14)
         where(slides, py * py * across + c * kept, c * scale),
         where(slides, -px * py * across - fp * kept, -fp * scale),
         where(slides, px * px * across + a * kept, a * scale),
@@ -194,6 +194,6 @@ def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...])
     before = each(unheld_velocity, (alone,), footings)
     gained, resisted = total(each(work_parts, (), grips, before, each(floor_answer, (by_floor,), footings, grips)))
     nothing = 0.0 * resisted
-    share = clip(-gained / maximum(resisted, TINY + nothing), nothing, 1.0 + nothing)  # (S13)
+    share = clip(-gained / maximum(resisted, TINY + nothing), nothing, 1.0 + nothing)  # (S14)
     step = (share * by_floor[0], share * by_floor[1], share * by_floor[2])
     return add(alone, step), each(lessened, (share,), grips)

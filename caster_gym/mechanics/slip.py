@@ -129,7 +129,7 @@ def steered(h: Scalar, omega: Scalar, f: Direction, rates: Pair) -> Direction:
 def lasting_slide(before: Pair, halfway: Pair, free: Pair) -> Pair:
     """Velocity that an impulse opposes, less what it changes: the mean of a step where a slide lasts, else the end's.
 
-    Twice the mean, which has the same direction. A slide lasts if half a step takes less than a quarter of it. (S14)
+    Twice the mean, which has the same direction. A slide lasts if half a step takes less than a quarter of it. (S15)
     """
     x, y = halfway[0] - before[0], halfway[1] - before[1]
     square = before[0] * before[0] + before[1] * before[1]

@@ -28,7 +28,7 @@ def explained_share(
 ) -> Scalar:
     """Share of all velocities at a step's end with which the robot has the energy that work and order explain at most.
 
-    1 in every step whose error is that of its order. (S16)
+    1 in every step whose error is that of its order. (S11)
     """
     v = add(start.twist, change)
     before = slip_energy(start.twist, start.directions, start.rates, robot)
@@ -40,4 +40,4 @@ def explained_share(
     size = before + sqrt(work * work)
     allowed = before + work + turn * (turn * turn * size * TURN_ERROR + work * work / maximum(size, TINY + 0.0 * size))
     one = 1.0 + 0.0 * size
-    return sqrt(clip(allowed / maximum(after, TINY + 0.0 * size), 0.0 * size, one))  # (S16)
+    return sqrt(clip(allowed / maximum(after, TINY + 0.0 * size), 0.0 * size, one))  # (S11)

@@ -57,7 +57,7 @@ def fading_limit(contact_time: Scalar, friction: Scalar, load: Scalar, u: Pair) 
     """Greatest impulse of the floor on a wheel over the contact time; none on one that slides already."""
     slides = sqrt(u[0] * u[0] + u[1] * u[1])
     fades = clip(2.0 - slides / RESTING, 0.0 * slides, 1.0 + 0.0 * slides)
-    return impulse_limit(contact_time, friction * load * fades)  # (S15)
+    return impulse_limit(contact_time, friction * load * fades)  # (S16)
 
 
 def held_at_first(limit: Limit) -> Scalar:
