@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
@@ -369,4 +369,4 @@ def test_a_coasting_robot_gains_no_energy(seed, outline, e):
         walk.step(h)
         loose = STILL * (np.array(walk.pressing) - pressed_before)  # J, contacts are found still to that speed
         assert (energy(model, walk.state) <= before + 10.0 * error + loose + 1e-9).all()
-    assert (walk.impacts > 0).any()
+    assume((walk.impacts > 0).any())  # some robots turn about themselves and never reach a wall

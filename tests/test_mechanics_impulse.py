@@ -263,10 +263,10 @@ def test_a_contact_that_is_infinitely_rough_does_not_slide_away(e):
     v_n, v_t = np.moveaxis(rows @ twist[..., None], 1, 0)[..., 0]
     stays = v_n - w[:, 0, 1] / w[:, 1, 1] * v_t < -e * v_n
     assert stays.mean() > 0.8
-    _, after = model.collide(steering, twist, point, normal, e, 1e9)
+    _, after = model.collide(steering, twist, point, normal, e, 1e6)
     assert_allclose(
         (rows[:, 1] * after).sum(-1)[stays], 0.0, atol=1e-9
-    )  # m/s: rounding, and 1e-9 of the sliding impulse
+    )  # m/s: rounding, and what slides at 1e-6 of the impulse
 
 
 def test_hardly_sliding_contacts_end_as_those_that_do_not_slide():
