@@ -31,8 +31,8 @@ pictures: $(INSTALLED) ## The README's pictures, in docs/pictures
 	$(BIN)/python -m scripts.draw_pictures --out docs/pictures
 
 papers: $(INSTALLED) ## Both papers reproduced: pages, figures and tables in docs/papers
-	$(BIN)/caster-gym reproduce chung2008 --out docs/papers --overwrite
-	$(BIN)/caster-gym reproduce kim2001 --out docs/papers --overwrite
+	$(BIN)/python -m papers chung2008 --out docs/papers --overwrite
+	$(BIN)/python -m papers kim2001 --out docs/papers --overwrite
 
 test: lint ## Lint, then all tests
 	$(BIN)/python -m pytest

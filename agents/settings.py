@@ -1,12 +1,10 @@
 """Typed settings of tasks and comparisons; the YAML files in configs/ hold what differs from the defaults."""
 
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import (
-    BaseModel,
     Field,
     PositiveFloat,
     PositiveInt,
@@ -17,8 +15,9 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
+from caster_gym.agents import usual_names as usual
 from caster_gym.arena.arena import Arena, read_arena
-from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
+from caster_gym.configuration import Frozen
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
@@ -29,8 +28,6 @@ from caster_gym.robot import Robot, load_robot
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
-
-from . import usual_names as usual
 
 Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -174,40 +171,3 @@ class BenchmarkSettings(Frozen):
         if len(set(seeds)) < len(seeds):
             raise ValueError(f"must differ from one another, got {list(seeds)}")
         return seeds
-
-
-Settings = TypeVar("Settings", bound=BaseModel)
-
-
-def names_of(kind: str) -> list[str]:
-    """Names of the tasks, agents, designs or benchmarks that come with the package."""
-    return sorted(file.stem for file in _folder_of(kind).glob("*.yaml"))
-
-
-def _folder_of(kind: str) -> Path:
-    return Path(str(files("caster_gym.configs"))) / kind
-
-
-def find(kind: str, name: str | Path) -> Path:
-    """The file of a task, agent, design or benchmark: one that comes with the package, by its name, or a path."""
-    if is_yaml(name):
-        path = Path(name).expanduser()
-        if not path.exists() and path.stem in names_of(kind):
-            raise ConfigurationError(
-                f"there is no file {str(name)!r}; what comes with the package is called {path.stem!r}"
-            )
-        return path
-    name = str(name)
-    if name not in names_of(kind):
-        own = next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
-        known = f"known are {', '.join(names_of(kind))}, or give the path of a YAML file"
-        raise ConfigurationError(
-            f"there is no {name!r} in {kind}; {f'did you mean the file {own!r}?' if own else known}"
-        )
-    return _folder_of(kind) / f"{name}.yaml"
-
-
-def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:
-    """Checked settings from a file that `find` finds."""
-    path = find(kind, name)
-    return parse(model, read_yaml(path), str(path), path.parent)

@@ -17,7 +17,7 @@ def main() -> None:
             return
         sys.exit(_refuse(missing))
     try:
-        app = import_module("caster_gym.agents.cli").app
+        app = import_module("caster_gym.agents.commands.cli").app
     except KeyboardInterrupt:  # afterwards each command says what is left
         print("caster-gym: interrupted; nothing was written", file=sys.stderr)
         sys.exit(130)

@@ -12,7 +12,7 @@ import gymnasium as gym
 import yaml
 from PIL import Image
 
-from caster_gym.agents.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.envs.scene import Scene
 from caster_gym.render.recording import recording
 from caster_gym.render.viewer import Viewer

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from caster_gym.analysis.identification import identify
-from caster_gym.analysis.recording import Noise, Recording
-from caster_gym.analysis.unknowns import robot_with
-from caster_gym.papers.page import markdown_table
+from caster_gym.identification.fit import identify
+from caster_gym.identification.recording import Noise, Recording
+from caster_gym.identification.unknowns import robot_with
+from caster_gym.report.page import markdown_table
 from caster_gym.robot import Robot, load_robot
 from scripts.maximal_bodies import Array, FrictionLaw, MaximalBodies
 

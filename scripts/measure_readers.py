@@ -15,7 +15,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from caster_gym.export.mjcf import mjcf
-from caster_gym.papers.page import markdown_table
+from caster_gym.report.page import markdown_table
 from caster_gym.robot import Robot, load_robot
 from scripts.readers.facts import FACTS, READERS
 

@@ -14,8 +14,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from caster_gym import Robot, load_robot
-from caster_gym.agents.run_folder import check_can_be_made
-from caster_gym.engines.threads import get_threads
+from caster_gym.engines.native.threads import get_threads
+from caster_gym.report.run_folder import check_can_be_made
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import draw_growth, growth_rows
 from scripts.speed_limits import operations_of_a_step

@@ -26,8 +26,11 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 from tqdm import tqdm
 
-from caster_gym.agents.actor import Actor
-from caster_gym.agents.agent_settings import (
+from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
+from caster_gym.agents.comparison.metrics import yardstick
+from caster_gym.agents.control.protocol import Agent
+from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.agent_settings import (
     ComputedTorqueSettings,
     LearnedSettings,
     PPOSettings,
@@ -35,17 +38,15 @@ from caster_gym.agents.agent_settings import (
     SHACSettings,
     read_agent,
 )
-from caster_gym.agents.bundle import load_bundle
-from caster_gym.agents.evaluation import bare, roll_out, test_batch, training_batch
-from caster_gym.agents.metrics import yardstick
-from caster_gym.agents.protocol import Agent
-from caster_gym.agents.run_folder import check_can_be_made
-from caster_gym.agents.sb3_environment import CasterVecEnv
-from caster_gym.agents.sb3_learning import learn_with_sb3, make_learner
-from caster_gym.agents.settings import TaskSettings, read_settings
-from caster_gym.agents.shac import ShortHorizon, learn_through_simulator, make_task
-from caster_gym.agents.training_run import Run
-from caster_gym.engines.threads import set_threads
+from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_learning import learn_with_sb3, make_learner
+from caster_gym.agents.learning.shac import ShortHorizon, learn_through_simulator, make_task
+from caster_gym.agents.learning.training_run import Run
+from caster_gym.agents.settings import TaskSettings
+from caster_gym.engines.native.threads import set_threads
+from caster_gym.report.run_folder import check_can_be_made
+from caster_gym.shipped_files import read_settings
 from scripts.speed_timing import RATE, Row, middle, run
 from scripts.training_busy import Beside, train_beside
 from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page
@@ -214,7 +215,7 @@ def way_of_learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:
     if isinstance(settings, SHACSettings):
         return learn_through_simulator
     if isinstance(settings, RslPPOSettings):
-        from caster_gym.agents.rsl_rl import learn_with_rsl_rl
+        from caster_gym.agents.learning.rsl_rl import learn_with_rsl_rl
 
         return learn_with_rsl_rl
     return learn_with_sb3

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from caster_gym import Robot, load_robot
-from caster_gym.papers.drawing import COLOURS, new_figure
+from caster_gym.report.drawing import COLOURS, new_figure
 from scripts.dry_friction import LOAD, PERIOD, SECONDS, SPEEDS, Creep, creep, creep_table
 from scripts.mujoco_robot import (
     DURATION,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym import Model, Robot
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
 from caster_gym.export.mjcf import mjcf
 from caster_gym.mechanics.parameters import GRAVITY, Dynamics
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from caster_gym import Model, Robot, load_robot
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
 from caster_gym.export.mjcf import mjcf
 from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import on_floor
@@ -29,7 +29,7 @@ from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import pairs
 from caster_gym.mechanics.slip import rolling_state, slip_step
-from caster_gym.papers.drawing import COLOURS, new_figure
+from caster_gym.report.drawing import COLOURS, new_figure
 from scripts.mujoco_peer import paragraph, spread
 from scripts.mujoco_robot import joint_indices, motor_torques, without_dry_friction
 

@@ -9,7 +9,7 @@ import numpy as np
 from caster_gym import Robot
 from caster_gym.arena import Arena
 from caster_gym.arena.arena import Pillar
-from caster_gym.papers.drawing import COLOURS, new_figure
+from caster_gym.report.drawing import COLOURS, new_figure
 from scripts.speed_robots import COURSES, FOLLOW, bare_equations, batch, on
 from scripts.speed_timing import RATE, Row, Values, middle
 

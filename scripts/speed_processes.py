@@ -29,7 +29,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 from caster_gym import load_robot
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
 from caster_gym.envs.setup import track_engine
 
 def environment(count):

@@ -8,12 +8,12 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from caster_gym import Robot
-from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import CasterVecEnv
 from caster_gym.arena import Arena, distances
 from caster_gym.arena.arena import Pillar
 from caster_gym.arena.packing import surroundings
-from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.threads import set_threads
+from caster_gym.engines.native.fleet import Fleet
+from caster_gym.engines.native.threads import set_threads
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from scripts.speed_timing import RATE, Row, Work, at_least, at_most, rate
 

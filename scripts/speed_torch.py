@@ -7,8 +7,8 @@ import numpy as np
 import torch
 
 from caster_gym import Robot
-from caster_gym.engines.torch_fleet import TorchFleet
-from caster_gym.envs.torch_vector_env import TorchVectorEnv
+from caster_gym.engines.tensor.fleet import TorchFleet
+from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from scripts.speed_robots import ACTION, BANK, CIRCLES, RK4_STEP, SCATTERING, SPEED, WIDE, limits
 from scripts.speed_timing import RATE, Goal, Row, Work, at_least, rate
 

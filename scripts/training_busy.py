@@ -11,8 +11,8 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 from tqdm import tqdm
 
-from caster_gym.agents.threads import limited_to
-from caster_gym.engines.cores import usable_cores
+from caster_gym.engines.native.cores import usable_cores
+from caster_gym.engines.tensor.threads import limited_to
 from scripts.mujoco_peer import paragraph
 from scripts.speed_page import table
 from scripts.speed_timing import RATE, middle, shown

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from caster_gym.agents.agent_settings import LearnedSettings
-from caster_gym.agents.metrics import Verdict
-from caster_gym.agents.provenance import versions
-from caster_gym.papers.drawing import COLOURS, new_figure
+from caster_gym.agents.comparison.metrics import Verdict
+from caster_gym.agents.learning.agent_settings import LearnedSettings
+from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.provenance import versions
 from scripts.mujoco_peer import paragraph
 from scripts.speed_page import processor, table
 from scripts.speed_timing import RATE, Ratio, Values, at_least, middle, shown, spread

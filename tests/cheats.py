@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.agents.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.envs.observation import ObservationLayout
 
 Array: TypeAlias = NDArray[np.float64]

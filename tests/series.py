@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from caster_gym.agents.evaluation import Episodes
+from caster_gym.agents.comparison.evaluation import Episodes
 
 PERIOD = 0.5
 STEPS = 6  # three seconds

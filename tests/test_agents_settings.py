@@ -7,7 +7,8 @@ import pytest
 import yaml
 from gymnasium.vector import AutoresetMode
 
-from caster_gym.agents.agent_settings import (
+from caster_gym.agents.comparison.evaluation import bare, make_batch
+from caster_gym.agents.learning.agent_settings import (
     AgentSettings,
     ComputedTorqueSettings,
     LearnedSettings,
@@ -15,12 +16,12 @@ from caster_gym.agents.agent_settings import (
     SACSettings,
     read_agent,
 )
-from caster_gym.agents.evaluation import bare, make_batch
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, find, read_settings
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import load_robot
+from caster_gym.shipped_files import find, read_settings
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {

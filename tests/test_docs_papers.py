@@ -1,4 +1,4 @@
-"""The pages that `caster-gym reproduce` made are the whole of both papers, and every difference has its evidence."""
+"""The pages that `python -m papers` made are the whole of both papers, and every difference has its evidence."""
 
 import csv
 import re

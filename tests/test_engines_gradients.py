@@ -4,9 +4,9 @@ import pytest
 import torch
 
 from caster_gym import load_robot
-from caster_gym.engines.torch_fleet import TorchFleet
-from caster_gym.engines.torch_model import TorchModel
-from caster_gym.envs.torch_task import TorchTask
+from caster_gym.engines.tensor.fleet import TorchFleet
+from caster_gym.engines.tensor.model import TorchModel
+from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.mechanics.parameters import robot_parameters
 from tests.random_robots import random_robot
 from tests.walks import around_it, shaped

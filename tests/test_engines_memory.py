@@ -5,7 +5,7 @@ import pytest
 
 import caster_gym
 from caster_gym.engines.memory import check_memory
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
 
 TOO_MANY = 10**10  # 5 TB of states alone
 

@@ -1,14 +1,14 @@
-"""caster_gym.engines.numba_compiler, .lanes and .numba_fleet: the mechanics compiled, and in batches."""
+"""caster_gym.engines.native.compiler, .lanes and .numba_fleet: the mechanics compiled, and in batches."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model, load_robot
-from caster_gym.engines.lanes import LANES, block_count, from_lanes, to_lanes
-from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.threads import BLOCKS_PER_SHARE, get_threads, set_threads
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.native.fleet import Fleet
+from caster_gym.engines.native.lanes import LANES, block_count, from_lanes, to_lanes
+from caster_gym.engines.native.threads import BLOCKS_PER_SHARE, get_threads, set_threads
+from caster_gym.engines.tensor.model import TorchModel
 from tests.random_robots import random_robot
 
 STEP = 2e-3  # s

@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model, load_robot
 from caster_gym.arena import read_arena
 from caster_gym.arena.packing import surroundings
-from caster_gym.engines.lanes import LANES
-from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.native.fleet import Fleet
+from caster_gym.engines.native.lanes import LANES
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.mechanics.separation import clearance
 from caster_gym.robot import Footprint
 

@@ -11,9 +11,9 @@ from caster_gym import Model, load_robot
 from caster_gym.arena.arena import Arena, Pillar
 from caster_gym.arena.packing import surroundings
 from caster_gym.configuration import ConfigurationError
-from caster_gym.engines.numba_fleet import Fleet
-from caster_gym.engines.torch_fleet import TorchFleet
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.native.fleet import Fleet
+from caster_gym.engines.tensor.fleet import TorchFleet
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.floor import Floor, Patch
 from tests.random_robots import random_robot
 

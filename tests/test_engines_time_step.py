@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from caster_gym import Model, Robot, load_robot
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
+from caster_gym.engines.tensor.fleet import TorchFleet
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.engines.time_scales import limits
 from caster_gym.engines.time_step import (
     check_time_step,
@@ -15,10 +17,8 @@ from caster_gym.engines.time_step import (
     longest_time_step,
     substeps_for,
 )
-from caster_gym.engines.torch_fleet import TorchFleet
-from caster_gym.engines.torch_model import TorchModel
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
-from caster_gym.envs.torch_vector_env import TorchVectorEnv
+from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from caster_gym.mechanics.dynamics import kinetic_energy
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters, unpack_parameters

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.wrappers import RecordEpisodeStatistics
 
-from caster_gym.agents.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import CasterVecEnv
 from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, MotorLag, Payload, Potential, Pushes, SensorNoise, Smoothness, wrap

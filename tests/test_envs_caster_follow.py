@@ -12,7 +12,7 @@ from gymnasium.wrappers import TimeLimit
 from numpy.testing import assert_array_equal
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
-from caster_gym.engines.lanes import LANES
+from caster_gym.engines.native.lanes import LANES
 from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.envs.follow_task import FollowTask
 from tests.test_envs_vector import assert_same, random_actions

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from caster_gym.envs import task_kernel  # noqa: F401  # teaches Numba the functions of randomness
+from caster_gym.envs.native import step as task_kernel  # noqa: F401  # teaches Numba the functions of randomness
 from caster_gym.envs.randomness import mix, uniform
 
 GOLDEN = 0x9E3779B97F4A7C15

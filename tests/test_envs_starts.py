@@ -13,7 +13,7 @@ from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.envs.starts import check_motion
-from caster_gym.envs.torch_vector_env import TorchVectorEnv
+from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from caster_gym.robot import load_robot
 from caster_gym.wrappers import ActionDelay, Payload, SensorNoise, wrap
 

@@ -5,9 +5,9 @@ import pytest
 import torch
 from numpy.testing import assert_allclose
 
-from caster_gym.envs.torch_task import TorchTask
+from caster_gym.envs.tensor.task import TorchTask
 from tests.test_envs_floor import ISLANDS, OBSTACLES
-from tests.test_envs_torch_vector_env import assert_same_episodes, both, random_actions
+from tests.test_envs_tensor_vector_env import assert_same_episodes, both, random_actions
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
 

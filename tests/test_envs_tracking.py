@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.engines.numba_fleet import Fleet
+from caster_gym.engines.native.fleet import Fleet
 from caster_gym.envs import tracking
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import Errors, Record, Reference, Terms, Weights

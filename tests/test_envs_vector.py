@@ -9,8 +9,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import TimeLimit
 from numpy.testing import assert_array_equal
 
-from caster_gym.engines.lanes import LANES
-from caster_gym.engines.threads import BLOCKS_PER_SHARE, get_threads, set_threads
+from caster_gym.engines.native.lanes import LANES
+from caster_gym.engines.native.threads import BLOCKS_PER_SHARE, get_threads, set_threads
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 
 TASK = {"corridor": 0.12, "path": {"shape": "circle", "radius": 0.5}}  # random torques leave it, sooner or later

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from caster_gym import Model, load_robot
-from caster_gym.agents.cli import app
+from caster_gym.agents.commands.cli import app
 from caster_gym.export.mjcf import mjcf
 from tests.random_robots import random_robot
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from caster_gym.agents.benchmark import read_comparison
-from caster_gym.agents.design import read_design
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, read_settings
+from caster_gym.agents.comparison.benchmark import read_comparison
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
 from caster_gym.configuration import ConfigurationError, Frozen, parse
+from caster_gym.design.command import read_design
 from caster_gym.file_names import FileName, NameOrFile, from_working_folder, is_file_name
+from caster_gym.shipped_files import read_settings
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {kind: [{"shape": "random_paths", "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}

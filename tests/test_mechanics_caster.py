@@ -6,7 +6,7 @@ import torch
 from numpy.testing import assert_allclose
 
 from caster_gym import Model
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.mechanics.caster import joint_rates, link_mass_centre, pivot_velocity, rate_drifts, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
 from tests.kane import Kane

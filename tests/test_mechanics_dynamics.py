@@ -6,7 +6,7 @@ import torch
 from numpy.testing import assert_allclose
 
 from caster_gym import Model
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.mechanics.dynamics import pivot_inertia
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import Robot

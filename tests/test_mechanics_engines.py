@@ -8,7 +8,7 @@ import torch
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model, load_robot
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from tests.random_robots import CASTER_COUNTS, random_motion, random_robot
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.engines.torch_model import TorchModel
+from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.mechanics.impulse import Mobility, stronge
 from caster_gym.mechanics.impulse import impact as struck
 from tests.kane import Kane

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-import caster_gym.engines.torch_model  # noqa: F401  teaches the choices and roots of tensors
+import caster_gym.engines.tensor.model  # noqa: F401  teaches the choices and roots of tensors
 from caster_gym import load_robot
 from caster_gym.mechanics.dynamics import joint_friction
 from caster_gym.mechanics.parameters import robot_parameters

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-import caster_gym.engines.numba_compiler
-import caster_gym.engines.torch_model  # noqa: F401  teaches the choices and roots of tensors
+import caster_gym.engines.native.compiler
+import caster_gym.engines.tensor.model  # noqa: F401  teaches the choices and roots of tensors
 from caster_gym.arena import read_arena
 from caster_gym.arena.outlines import Outline, convex
 from caster_gym.arena.packing import hull_from, pack

@@ -15,7 +15,7 @@ from typer.main import get_command
 
 import caster_gym
 import caster_gym.agents
-from caster_gym.agents.cli import app
+from caster_gym.agents.commands.cli import app
 from caster_gym.configuration import Frozen
 from caster_gym.envs.caster_follow import CasterFollowEnv
 from caster_gym.envs.caster_track import CasterTrackEnv
@@ -29,13 +29,13 @@ OTHERS = {"psi": "a column of angles", "caster_gym": "the package itself"}
 
 # each sentence that says what "would do", by the file that says it, and the test that does it
 PROMISES = {
-    "agents/design.py": [
-        "analysis_sizing::test_motors_of_exactly_the_required_size_drive_the_paths_and_smaller_ones_do_not"
+    "caster_gym/design/command.py": [
+        "design_sizing::test_motors_of_exactly_the_required_size_drive_the_paths_and_smaller_ones_do_not"
     ],
-    "agents/model_trials.py": [
-        "agents_model_trials::test_the_shortest_time_leaves_the_motors_their_reserve_and_no_more"
+    "papers/chung2008/model_trials.py": [
+        "papers_chung2008_model_trials::test_the_shortest_time_leaves_the_motors_their_reserve_and_no_more"
     ],
-    "caster_gym/analysis/design.py": ["analysis_design::test_motors_that_are_too_slow_for_every_design_are_refused"],
+    "caster_gym/design/search.py": ["design_search::test_motors_that_are_too_slow_for_every_design_are_refused"],
     "caster_gym/arena/beside.py": [
         "arena_beside::test_where_there_is_no_room_the_path_is_named_and_so_many_as_are_told_fit"
     ],

@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
-from caster_gym.analysis.recording import record, write_recording
 from caster_gym.configuration import ConfigurationError
+from caster_gym.identification.recording import record, write_recording
 from caster_gym.paths import Trajectory, build_trajectories, read_paths
 from caster_gym.paths.course import build_courses
 from caster_gym.paths.random_paths import RandomPaths

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.infos import named
 from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
+from caster_gym.envs.native.engine import DRAW_A_PATH, TaskEngine
 from caster_gym.envs.setup import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
 from caster_gym.envs.task import Task
-from caster_gym.envs.task_engine import DRAW_A_PATH, TaskEngine
 
 Observation = NDArray[np.float32]
 _ONLY, _CHOSEN = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.bool_)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.inputs import Seeds, checked_mask, checked_seeds, read_actions
+from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.setup import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
 from caster_gym.envs.task import Task
-from caster_gym.envs.task_engine import DRAW_A_PATH, Outcome, TaskEngine
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]

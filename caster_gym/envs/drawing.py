@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import logger
 from numpy.typing import NDArray
 
-from caster_gym.envs.task_engine import TaskEngine
+from caster_gym.envs.native.engine import TaskEngine
 
 if TYPE_CHECKING:
     from caster_gym.render.album import Album

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs.block_layout import (
+from caster_gym.envs.native.layout import (
     CONDITIONING,
     ENDINGS,
     FIRST_POSE,

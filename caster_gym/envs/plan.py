@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs.guides import Courses, Timetable
+from caster_gym.envs.native.reference import Courses, Timetable
 from caster_gym.floor import Floor
 from caster_gym.mechanics.separation import Surroundings
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.engines.lanes import BODY_ROWS
-from caster_gym.envs.block_layout import (
+from caster_gym.engines.native.lanes import BODY_ROWS
+from caster_gym.envs.native.layout import (
     ENDINGS,
     FIRST_POSE,
     FIRST_RECORD,

@@ -19,12 +19,12 @@ from caster_gym.engines.time_step import check_time_step
 from caster_gym.envs import follow_task, track_task
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.following import FollowTerms
-from caster_gym.envs.guides import Courses, Timetable
 from caster_gym.envs.inputs import check_keywords
+from caster_gym.envs.native.engine import TaskEngine
+from caster_gym.envs.native.reference import Courses, Timetable
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan, joined
 from caster_gym.envs.task import Task
-from caster_gym.envs.task_engine import TaskEngine
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.floor import Floor

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.arena.clearance import ROUNDING
-from caster_gym.engines.lanes import BODY_ROWS
+from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.engines.numpy_model import Model
-from caster_gym.envs.block_layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
-from caster_gym.envs.guides import Courses
 from caster_gym.envs.inputs import checked_numbers, checked_options
+from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
+from caster_gym.envs.native.layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
+from caster_gym.envs.native.reference import Courses
 from caster_gym.envs.randomness import bits, episode_seed
-from caster_gym.envs.task_engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.tracking import Reference, start
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import unpack_parameters

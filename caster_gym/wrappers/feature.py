@@ -16,9 +16,9 @@ from pydantic import AfterValidator
 from caster_gym.configuration import Frozen
 
 if TYPE_CHECKING:
+    from caster_gym.envs.native.engine import TaskEngine
     from caster_gym.envs.observation import Part
     from caster_gym.envs.task import Task
-    from caster_gym.envs.task_engine import TaskEngine
 
 Array: TypeAlias = NDArray[np.float64]
 Actions: TypeAlias = NDArray[np.float32]

@@ -26,8 +26,8 @@ from caster_gym.wrappers.feature import (
 )
 
 if TYPE_CHECKING:
+    from caster_gym.envs.native.engine import TaskEngine
     from caster_gym.envs.task import Task
-    from caster_gym.envs.task_engine import TaskEngine
 
 EVERYONE = slice(None)
 _TRIED = 32  # draws of the plants that are checked beforehand

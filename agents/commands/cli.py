@@ -1,0 +1,300 @@
+"""The command caster-gym: train, evaluate, benchmark, watch, design, identify, export, warm."""
+
+from itertools import count
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import caster_gym
+from caster_gym.agents.commands.command_line import (
+    NOTHING_WRITTEN,
+    PARTS_BAR,
+    Changes,
+    Out,
+    Overwrite,
+    TaskName,
+    Threads,
+    TrainedTask,
+    changes_of,
+    files_among,
+    plain_errors,
+    progress,
+)
+from caster_gym.agents.learning.agent_settings import ComputedTorqueSettings, read_agent
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.report.run_folder import begun, check_file, check_free, staged
+from caster_gym.shipped_files import read_settings
+
+MJCF_SUFFIXES = (".xml", ".mjcf")
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,  # it takes a unit such as [s] for markup, and leaves it out
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+    help="Train, evaluate and compare controllers of omnidirectional robots on powered casters.",
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"caster_gym {caster_gym.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_command(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Train, evaluate and compare controllers of omnidirectional robots on powered casters."""
+
+
+@app.command()
+def train(
+    agent: Annotated[str, typer.Argument(help="Name of an agent in configs/agents, or path of a YAML file.")] = "ppo",
+    task: TaskName = "track",
+    seed: Annotated[int, typer.Option(help="Seed of networks, exploration and starts.", min=0, max=2**32 - 1)] = 0,
+    out: Out = Path("runs/train"),
+    overwrite: Overwrite = False,
+    change: Changes = None,
+    threads: Threads = 1,
+) -> None:
+    """Train a policy; the best one on validation paths is OUT/best, a folder that `evaluate` reads."""
+    with plain_errors():
+        from caster_gym.agents.comparison.metrics import in_words
+        from caster_gym.agents.learning.training import train as run
+
+        settings = read_agent(agent, changes_of(change))
+        if isinstance(settings, ComputedTorqueSettings):
+            raise ValueError(f"agent {agent!r} does not learn; try it with `caster-gym evaluate {agent}`")
+        tasks = read_settings(TaskSettings, "tasks", task)
+        kept = files_among(agent, task, tasks.robot)
+        bar = {"total": settings.steps, "desc": f"{Path(agent).stem} seed {seed}", "unit": "step", "unit_scale": True}
+        with begun(out, overwrite, "best/policy.yaml", kept), progress(**bar) as show:
+
+            def report(steps: int, verdict: str) -> None:
+                show(min(steps, settings.steps), verdict)
+
+            best = run(tasks, settings, seed, out, report, threads)
+        typer.echo(
+            f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: {in_words(best.verdict)}. "
+            f"It is in {out / 'best'}."
+        )
+
+
+@app.command()
+def evaluate(
+    policy: Annotated[str, typer.Argument(help="Folder of a trained policy, or name of a model-based agent.")],
+    task: TrainedTask = None,
+    starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
+    out: Out = Path("runs/evaluate"),
+    overwrite: Overwrite = False,
+    threads: Threads = 1,
+) -> None:
+    """Try an agent on the test paths of a task, a policy on those of its own: a table, all episodes as CSV, figures."""
+    with plain_errors():
+        from caster_gym.agents.comparison.benchmark import Contender, compare, ready_agent
+        from caster_gym.agents.comparison.evaluation import bare, test_batch
+        from caster_gym.agents.comparison.figures import write_figures
+        from caster_gym.agents.comparison.summary import table, write_episodes, write_summary
+        from caster_gym.agents.learning.trained_task import choose_task
+        from caster_gym.engines.tensor.threads import limited_to
+        from caster_gym.report.provenance import write_provenance
+
+        tasks, words = choose_task(policy, task)
+        settings = BenchmarkSettings(agents=(policy,), starts=starts)
+        for read in files_among(task, tasks.robot):
+            check_free(out, overwrite, kept=read)
+        with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
+            test = test_batch(tasks, tasks.test, starts)
+            agent = ready_agent(policy, tasks, test)
+            results, episodes = compare([Contender(agent.name, agent, None)], test, settings)
+            text = f"{words}\n\n{table(results, settings.confidence)}"
+            write_episodes(folder / "episodes.csv", results)
+            write_summary(folder / "summary.csv", results, settings.confidence)
+            (folder / "table.md").write_text(text + "\n", encoding="utf-8")
+            write_figures(folder, episodes, {}, bare(test).engine.plan)
+            write_provenance(folder, policy=policy, task=tasks.model_dump(mode="json"), starts=starts, threads=threads)
+        typer.echo(text)
+        typer.echo(f"Results and figures are in {out}.")
+
+
+@app.command()
+def benchmark(
+    config: Annotated[str, typer.Option(help="Name of a comparison in configs/benchmarks, or a YAML file.")] = "track",
+    out: Out = Path("runs/benchmark"),
+    overwrite: Overwrite = False,
+    change: Changes = None,
+    threads: Threads = 1,
+) -> None:
+    """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
+    with plain_errors():
+        from caster_gym.agents.comparison.benchmark import read_comparison, run_benchmark
+
+        settings = read_settings(BenchmarkSettings, "benchmarks", config)
+        comparison = read_comparison(settings, changes_of(change))
+        named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
+        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=named):
+            text = run_benchmark(comparison, out, threads)
+        typer.echo(text)
+        typer.echo(f"Results, policies and figures are in {out}.")
+
+
+@app.command()
+def watch(
+    agent: Annotated[
+        str,
+        typer.Argument(
+            help="Folder of a trained policy, name of a model-based agent, or keyboard: W, A, S, D or arrows drive, "
+            "Q and E turn."
+        ),
+    ] = "computed_torque",
+    task: TrainedTask = None,
+    path: Annotated[str, typer.Option(help="Name or index of a test path; the first robot's, of several.")] = "0",
+    robots: Annotated[int, typer.Option(help="How many, each on a test path of its own.", min=1, max=16)] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the starts.", min=0, max=2**32 - 1)] = 0,
+    save: Annotated[Path | None, typer.Option(help="Film to write instead of a window: run.mp4 or run.gif.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a film that is there.")] = False,
+    seconds: Annotated[float | None, typer.Option(help="Stop after that time.")] = None,
+) -> None:
+    """Show an agent on the test paths of a task, a policy on its own, or drive yourself: in a window or a film."""
+    with plain_errors():
+        from caster_gym.agents.commands.watch import watch as run
+        from caster_gym.agents.learning.trained_task import choose_task
+        from caster_gym.engines.tensor.threads import DEFAULT, limited_to
+
+        settings, words = choose_task(agent, task)
+        with limited_to(DEFAULT):
+            frames = run(agent, settings, path, robots, seed, save, overwrite, seconds, begin=lambda: typer.echo(words))
+        if save is not None:
+            typer.echo(f"{frames} frames are in {save}.")
+
+
+@app.command()
+def design(
+    robot: Annotated[
+        str | None, typer.Option(help="Name of a robot in configs/robots, or path of a YAML file; else the target's.")
+    ] = None,
+    target: Annotated[
+        str, typer.Option(help="Name of a target in configs/designs, or path of a YAML file.")
+    ] = "indoor",
+    out: Out = Path("runs/design"),
+    overwrite: Overwrite = False,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a setting of the target, e.g. --set speed=1.5. May be repeated."),
+    ] = None,
+) -> None:
+    """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
+    with plain_errors(NOTHING_WRITTEN):
+        from caster_gym.design.command import design as run
+        from caster_gym.design.command import read_design
+
+        settings = read_design(target, robot, changes_of(change))
+        with progress(total=100, desc=f"design of {Path(settings.robot).stem}", unit="%") as show:
+            words = run(settings, out, overwrite, lambda share: show(round(100.0 * share)))
+        typer.echo(f"{words} The page, the picture, the table of motors and the robot file are in {out}.")
+
+
+@app.command()
+def identify(
+    recording: Annotated[
+        Path | None, typer.Argument(help="CSV file of a recording; --example shows the format.")
+    ] = None,
+    robot: Annotated[
+        str, typer.Option(help="The robot as it is thought to be: its name, or path of a YAML file.")
+    ] = "chung2008",
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
+            "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail, radius, steering_zero, "
+            "roll_strength, steer_strength (of all casters, or as radius_2 of one; radii, trails, steering_zeros of "
+            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Without it: mass and place "
+            "of a payload."
+        ),
+    ] = None,
+    example: Annotated[Path | None, typer.Option(help="Write an example recording to this CSV file instead.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the example.", min=0, max=2**32 - 1)] = 0,
+    out: Out = Path("runs/identify"),
+    overwrite: Overwrite = False,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a setting, e.g. --set window=0.5 or --set 'noise={position: 0.001}'."),
+    ] = None,
+) -> None:
+    """Payload, friction, wheels, motors and zeros of a robot from a recording, with intervals, and a robot file."""
+    with plain_errors(NOTHING_WRITTEN):
+        from caster_gym.identification.command import PAYLOAD, read_identify, write_example
+        from caster_gym.identification.command import identify as run
+
+        if example is not None and recording is None:
+            typer.echo(write_example(example, robot, seed, overwrite))
+            return
+        if recording is None or example is not None:
+            raise ValueError("give either a recording, or --example with the file to write one to")
+        settings = read_identify(robot, unknown or PAYLOAD, changes_of(change))
+        step = count(1)
+        with progress(desc="identify", unit="step") as show:
+            words = run(recording, settings, out, overwrite, lambda: show(next(step)))
+        typer.echo(words)
+        typer.echo(f"The page, the figure and robot.yaml are in {out}.")
+
+
+@app.command()
+def export(
+    robot: Annotated[str, typer.Argument(help="Name of a robot, or path of its YAML file.")],
+    mjcf: Annotated[Path, typer.Option(help="File for the robot as a MuJoCo model, such as robot.xml.")],
+    time_step: Annotated[
+        float, typer.Option(help="Time step of the model [s]; MuJoCo's slip falls in proportion to it.")
+    ] = 2e-3,
+    friction: Annotated[
+        float,
+        typer.Option(
+            help="Coefficient of friction between wheels and floor [-]; a great one comes nearest to rolling."
+        ),
+    ] = 5.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a robot as a model for MuJoCo (MJCF): bodies, joints, gears and motors, wheels that roll by friction."""
+    with plain_errors():
+        from caster_gym.export.mjcf import mjcf as model
+        from caster_gym.robot import load_robot
+
+        if mjcf.suffix.lower() not in MJCF_SUFFIXES:
+            better = f"{mjcf.stem.strip('.') or 'robot'}.xml"
+            raise ValueError(f"what is written is MJCF, for MuJoCo, got the name {mjcf.name!r}; call it {better!r}")
+        text = model(load_robot(robot), time_step, friction)
+        check_file(mjcf, overwrite, "--mjcf")
+        mjcf.write_text(text, encoding="utf-8")
+        typer.echo(f"The model is in {mjcf}.")
+
+
+@app.command()
+def warm(
+    robot: Annotated[
+        list[str] | None, typer.Option(help="Name of a robot, or path of a YAML file; may be repeated.")
+    ] = None,
+    task: Annotated[
+        list[str] | None, typer.Option(help="Name of a task, or path of a YAML file; may be repeated.")
+    ] = None,
+    casters: Annotated[
+        list[int] | None, typer.Option(help="Number of casters of some other robot; may be repeated.")
+    ] = None,
+) -> None:
+    """Compile ahead what robots and tasks need, those that come with the package unless others are named."""
+    with plain_errors("what was compiled is kept; the same command goes on from there"):
+        from caster_gym.agents.commands.warm import read_pieces
+        from caster_gym.agents.commands.warm import warm as run
+
+        pieces = read_pieces(robot or [], task or [], casters or [])
+        with progress(total=len(pieces), desc="warm", bar_format=PARTS_BAR) as show:
+            result = run(pieces, show)
+        there = result.pieces - result.compiled
+        typer.echo(f"{result.compiled} parts were compiled, {there} were there already; all are in {result.folder}.")
+
+
+if __name__ == "__main__":
+    app(prog_name="caster-gym")

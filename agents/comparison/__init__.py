@@ -1,0 +1,1 @@
+"""Episodes rolled out, measured and compared."""

@@ -1,0 +1,237 @@
+"""Pictures of a comparison: paths driven, errors over time, speeds, torques, and how the policies learned."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.agents.comparison.evaluation import Episodes
+from caster_gym.agents.comparison.measuring import Printed, shown
+from caster_gym.agents.learning.training_run import Validation
+from caster_gym.envs.native.reference import Courses
+from caster_gym.envs.plan import Plan
+from caster_gym.render.palette import SERIES as COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+OBSTACLE = "0.75"
+MOST_PATHS = 6
+MAGNIFIED = 20.0  # how much larger tracking errors are drawn
+
+
+def write_figures(
+    folder: Path, episodes: Mapping[str, Episodes], histories: Mapping[str, Sequence[Validation]], plan: Plan
+) -> list[Path]:
+    """Pictures of the episodes of a plan, by agent, and of what was learned, if anything; returns their paths.
+
+    paths.png, errors.png, torques.png, learning.png and overview.png; speeds.png of paths that are followed at the
+    robot's own pace.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    colours = dict(zip(episodes, COLOURS * (1 + len(episodes) // len(COLOURS)), strict=False))
+    chosen = _telling_episodes(next(iter(episodes.values())).names)
+    own_pace = isinstance(plan.guide, Courses)
+    figures: dict[str, Any] = {}
+
+    figure, places = _grid(len(chosen))
+    for axis, index in zip(places, chosen, strict=False):
+        draw_path(axis, episodes, index, colours, plan)
+    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figures["paths"] = figure
+
+    if own_pace:
+        figure, places = _grid(len(chosen))
+        for axis, index in zip(places, chosen, strict=False):
+            draw_speeds(axis, episodes, index, colours, plan)
+        figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        figures["speeds"] = figure
+
+    figure, (above, below) = plt.subplots(2, 1, figsize=(9, 7), sharex=True, layout="constrained")
+    draw_errors(above, episodes, "position_error", 1e3, "position error [mm]", colours)
+    draw_errors(below, episodes, "heading_error", 1e3, "heading error [mrad]", colours)
+    below.set_xlabel("time [s]")
+    above.legend(fontsize="small")
+    figures["errors"] = figure
+
+    figure, axes = plt.subplots(
+        len(episodes), 1, figsize=(9, 2.2 * len(episodes)), squeeze=False, sharex=True, layout="constrained"
+    )
+    for axis, (agent, series) in zip(axes[:, 0], episodes.items(), strict=True):
+        draw_torques(axis, series, chosen[-1])
+        axis.set_title(f"{agent}, {series.names[chosen[-1]]}", fontsize="medium")
+    axes[-1, 0].set_xlabel("time [s]")
+    axes[0, 0].legend(fontsize="x-small", ncols=3)
+    figures["torques"] = figure
+
+    curves = learning_curves(histories)
+    if curves:
+        figure, axes = plt.subplots(1, len(curves), figsize=(7 * len(curves), 4.5), squeeze=False, layout="constrained")
+        for axis, (name, how) in zip(axes[0], curves.items(), strict=True):
+            draw_learning(axis, histories, name, how)
+        figures["learning"] = figure
+
+    figure, axes = plt.subplots(1, 3 if curves else 2, figsize=(16 if curves else 11, 4.6), layout="constrained")
+    draw_path(axes[0], episodes, chosen[-1], colours, plan)
+    if own_pace:
+        draw_speeds(axes[1], episodes, chosen[-1], colours, plan)
+    else:
+        draw_errors(axes[1], episodes, "position_error", 1e3, "position error [mm]", colours)
+        axes[1].set_xlabel("time [s]")
+        axes[1].set_title("all test episodes: median, 10 to 90 %", fontsize="medium")
+    axes[1].legend(fontsize="small")
+    for name, how in list(curves.items())[-1:]:
+        draw_learning(axes[2], histories, name, how)
+    figures["overview"] = figure
+
+    written = []
+    for name, figure in figures.items():
+        path = folder / f"{name}.png"
+        figure.savefig(path, dpi=110)
+        plt.close(figure)
+        written.append(path)
+    return written
+
+
+def draw_path(
+    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+) -> None:
+    """What each agent drove in one episode, over its path and among its obstacles.
+
+    Against a timetable, errors are drawn twenty times as large.
+    """
+    first = next(iter(episodes.values()))
+    path = index % len(plan.names)
+    table = plan.tables[path]
+    own_pace = isinstance(plan.guide, Courses)
+    draw_obstacles(axis, plan, path)
+    name = "path" if own_pace else "reference"
+    axis.plot(table[:, 0], table[:, 1], color="0.6", linewidth=4, label=name, solid_capstyle="round")
+    for agent, series in episodes.items():
+        driven, asked = series.pose[:, index, :2], series.reference[:, index, :2]
+        if not own_pace:
+            driven = (asked + MAGNIFIED * (driven - asked))[round(2.0 / series.period) :]
+        axis.plot(driven[:, 0], driven[:, 1], color=colours[agent], linewidth=1.2, label=agent)
+    axis.plot(*table[0, :2], "o", color="black", markersize=5)
+    low, high = table[:, :2].min(axis=0), table[:, :2].max(axis=0)
+    centre, reach = 0.5 * (low + high), 0.15 + 0.6 * float((high - low).max())
+    axis.set_xlim(centre[0] - reach, centre[0] + reach)
+    axis.set_ylim(centre[1] - reach, centre[1] + reach)
+    axis.set_aspect("equal")
+    remark = "" if own_pace else f", errors × {MAGNIFIED:g} after 2 s"
+    axis.set_title(f"{first.names[index]}{remark}", fontsize="medium")
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+
+
+def draw_obstacles(axis: "Axes", plan: Plan, path: int) -> None:
+    """The obstacles beside one path."""
+    from matplotlib.patches import Circle, Polygon
+
+    obstacles = plan.around.obstacles
+    for k in range(*plan.arenas[path]):
+        first_face, _, first, end = obstacles.spans[k]
+        corners = obstacles.corners[first:end]
+        if len(corners) == 1:
+            axis.add_patch(Circle((corners[0, 0], corners[0, 1]), obstacles.radii[k], color=OBSTACLE, linewidth=0))
+        elif len(corners):
+            axis.add_patch(Polygon(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, linewidth=1.5))
+        else:
+            x, y, offset = obstacles.faces[first_face]
+            axis.axline((offset * x, offset * y), (offset * x - y, offset * y + x), color=OBSTACLE, linewidth=3)
+
+
+def draw_speeds(
+    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+) -> None:
+    """Speed along the path in one episode over the way, beside that of the time law."""
+    path = index % len(plan.names)
+    assert isinstance(plan.guide, Courses)
+    square = plan.tables[path][:, -1]
+    way = plan.guide.spacings[path] * np.arange(len(square))
+    axis.plot(way, np.sqrt(square), color="0.6", linewidth=4, label="time law")
+    for agent, series in episodes.items():
+        progress = series.progress[:, index]
+        axis.plot(progress[1:], np.diff(progress) / series.period, color=colours[agent], linewidth=1.2, label=agent)
+    axis.set_title(next(iter(episodes.values())).names[index], fontsize="medium")
+    axis.set_xlabel("progress [m]")
+    axis.set_ylabel("speed along the path [m/s]")
+    axis.grid(alpha=0.3)
+
+
+def draw_errors(
+    axis: "Axes", episodes: Mapping[str, Episodes], field: str, factor: float, label: str, colours: Mapping[str, str]
+) -> None:
+    """Median and 10 to 90 % of an error over all episodes that still run."""
+    for agent, series in episodes.items():
+        size = np.abs(getattr(series, field)) * factor
+        size = size[np.isfinite(size).sum(axis=1) * 2 > size.shape[1]]
+        time = series.period * np.arange(1, len(size) + 1)
+        low, middle, high = np.nanquantile(size, [0.1, 0.5, 0.9], axis=1)
+        axis.fill_between(time, low, high, color=colours[agent], alpha=0.2, linewidth=0)
+        axis.plot(time, middle, color=colours[agent], label=agent)
+    axis.set_yscale("log")
+    axis.set_ylabel(label)
+    axis.grid(alpha=0.3)
+
+
+def draw_torques(axis: "Axes", series: Episodes, index: int) -> None:
+    """Torques of all motors in one episode, as shares of their limits."""
+    share = series.share[:, index]
+    time = series.period * np.arange(1, len(share) + 1)
+    for motor in range(share.shape[1]):
+        kind = "roll" if motor % 2 == 0 else "steer"
+        colour, style = COLOURS[motor // 2 % len(COLOURS)], "-" if motor % 2 == 0 else ":"
+        axis.plot(time, share[:, motor], style, color=colour, linewidth=1.0, label=f"{kind}_{motor // 2 + 1}")
+    axis.set_ylabel("torque / limit")
+    axis.grid(alpha=0.3)
+
+
+def learning_curves(histories: Mapping[str, Sequence[Validation]]) -> dict[str, Printed]:
+    """The numbers of the verdicts that are to be seen, with how; none if nothing learned."""
+    verdicts = {type(one.verdict) for history in histories.values() for one in history}
+    return {name: how for kind in verdicts for name, how in shown(kind) if isinstance(how, Printed)}
+
+
+def draw_learning(axis: "Axes", histories: Mapping[str, Sequence[Validation]], name: str, how: Printed) -> None:
+    """One number of the verdicts on validation paths over training time, a line for each seed."""
+    for i, (run, history) in enumerate(histories.items()):
+        seconds = [one.seconds for one in history]
+        values = how.factor * np.array([getattr(one.verdict, name) for one in history])
+        values = np.where(np.isfinite(values), values, np.nan)
+        axis.plot(seconds, values, ".-", color=COLOURS[i % len(COLOURS)], label=run)
+    axis.set_yscale(how.scale)
+    axis.set_xlabel("training time [s], one core for each seed")
+    axis.set_ylabel(f"validation {how.label}")
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize="small")
+
+
+def _grid(used: int) -> tuple[Any, list["Axes"]]:
+    """A figure with a place for each path that is drawn."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 3, figsize=(12, 8), layout="constrained")
+    for axis in axes.flat[used:]:
+        axis.set_visible(False)
+    return figure, list(axes.flat)
+
+
+def _telling_episodes(names: Sequence[str]) -> list[int]:
+    """Some episodes worth drawing: random paths first, then those with a shape of their own."""
+    seen: set[str] = set()
+    shapes: list[int] = []
+    wandering: list[int] = []
+    for i, name in enumerate(names):
+        if name not in seen:
+            (wandering if name.startswith("random_paths") else shapes).append(i)
+        seen.add(name)
+    kept = shapes[:MOST_PATHS]
+    return [*wandering[: max(MOST_PATHS - len(kept), 0)], *kept]

@@ -1,0 +1,1 @@
+"""Policies that learn: settings, learners, bundles."""

@@ -1,0 +1,179 @@
+"""A policy on disk: a folder with weights as safetensors and everything else as YAML. Loading it runs no code.
+
+policy.yaml            what the policy is, for which robot and task, and how it came about
+weights.safetensors    the actor's weights
+"""
+
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+import yaml
+from pydantic import PositiveInt
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+
+from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
+from caster_gym.agents.settings import ChosenTask, in_brief
+from caster_gym.configuration import ConfigurationError, parse, read_yaml
+from caster_gym.envs.follow_task import FollowTask
+from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.track_task import TrackTask
+from caster_gym.robot import Robot
+from caster_gym.wrappers.feature import Feature
+from caster_gym.wrappers.specification import FeatureSpecification
+
+FORMAT = 1
+SHOWN = 3  # of the policies that a message may name
+UNITS: dict[str, Literal["s", "m"]] = {"track": "s", "follow": "m"}  # of each environment's preview
+DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
+
+
+class PolicyDescription(ChosenTask):
+    """All that is needed to act again, and to know where the policy came from."""
+
+    format: Literal[1]
+    name: str
+    squash: Squash
+    hidden: tuple[PositiveInt, ...]
+    robot: Robot
+    task: TrackTask | FollowTask
+    wrappers: tuple[FeatureSpecification, ...] = ()  # features of the environment that it acts in
+    actions: PositiveInt | None = None  # None: one for each driven joint
+    trained_with: dict[str, Any]  # settings, seed, steps
+    versions: dict[str, str]
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """What the policy's observations mean."""
+        unit = UNITS[self.environment]
+        return ObservationLayout(self.robot, self.task.preview, unit, self.task.nearest)
+
+
+class Bundle:
+    """A learned agent together with its description."""
+
+    def __init__(self, description: PolicyDescription, actor: Actor) -> None:
+        self.description = description
+        self.agent = LearnedAgent(actor, description.name)
+
+    def check_fits(self, layout: ObservationLayout, period: float, features: Sequence[Feature] = ()) -> None:
+        """Raises ValueError if the policy cannot act on observations of that layout, every period [s].
+
+        features: those of the environment; a policy needs those that say what its actions mean.
+        """
+        ours = self.description.layout
+        if ours.robot.joints != layout.robot.joints or ours.robot.driven != layout.robot.driven:
+            raise ValueError(
+                f"the policy drives {', '.join(ours.robot.driven)} of {ours.robot.name!r}, "
+                f"the task {', '.join(layout.robot.driven)} of {layout.robot.name!r}"
+            )
+        if self.description.task.control_period != period:
+            raise ValueError(
+                f"the policy acts every {self.description.task.control_period:g} s, the task every {period:g} s"
+            )
+        if ours.unit != layout.unit:
+            learned, asked = (_TOLD[unit] for unit in (ours.unit, layout.unit))
+            raise ValueError(f"the policy has learned to {learned}, the task is to {asked}")
+        if ours.preview != layout.preview:
+            raise ValueError(
+                f"the policy needs a preview of {ours.preview} {ours.unit}, the task shows {layout.preview} {ours.unit}"
+            )
+        if ours.nearest != layout.nearest:
+            raise ValueError(f"the policy sees {ours.nearest} obstacles, the task shows {layout.nearest}")
+        meant, understood = (
+            [feature for feature in some if feature.redefines_actions] for some in (self.description.wrappers, features)
+        )
+        if meant != understood:
+            raise ValueError(f"the policy's actions are {_named(meant)}, the task takes {_named(understood)}")
+
+
+_TOLD = {"s": "follow a timetable (environment 'track')", "m": "follow a path at its own pace (environment 'follow')"}
+
+
+def _named(features: Sequence[Feature]) -> str:
+    return ", ".join(map(in_brief, features)) or "torques"
+
+
+def save_bundle(folder: Path, bundle: Bundle) -> None:
+    """Write a bundle to a folder that comes into being whole or not at all; one that is there is replaced."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        weights = {name: tensor.contiguous() for name, tensor in bundle.agent.actor.state_dict().items()}
+        save_file(weights, fresh / WEIGHTS)
+        content = bundle.description.model_dump(mode="json")
+        (fresh / DESCRIPTION).write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        fresh.chmod(0o755)
+        old = fresh.with_name(fresh.name + "-old")
+        if folder.exists():
+            folder.replace(old)
+        fresh.replace(folder)
+        shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def load_bundle(folder: Path) -> Bundle:
+    """Read a bundle. Raises ConfigurationError that says what is missing or does not fit."""
+    if not (folder / DESCRIPTION).is_file():
+        raise ConfigurationError(_no_policy(folder))
+    content = read_yaml(folder / DESCRIPTION)
+    if content.get("format") != FORMAT:
+        raise ConfigurationError(
+            f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
+        )
+    description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
+    actions = description.actions or len(description.robot.driven)
+    actor = Actor(description.layout.size, description.hidden, actions, description.squash)
+    _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
+    return Bundle(description, actor)
+
+
+def _no_policy(folder: Path) -> str:
+    """What to say of a folder that is no policy: where the policies are that it was perhaps meant for."""
+    if folder.is_file():
+        ours = folder.name in (DESCRIPTION, WEIGHTS)
+        return f"{folder} is a file{f' of a policy; give its folder, {folder.parent}' if ours else ', not a policy'}"
+    if not folder.is_dir():
+        near = sorted(one.parent for one in folder.parent.glob(f"*/{DESCRIPTION}"))
+        there = f"; there is {' and '.join(map(str, near[:SHOWN]))}" if near else ""
+        return f"there is no folder {str(folder)!r} of a policy{there}"
+    if (folder / "best" / DESCRIPTION).is_file():
+        return f"{folder} is the folder of a training run; give the policy in it that did best, {folder / 'best'}"
+    kept = sorted(one.parent for one in folder.glob(f"**/best/{DESCRIPTION}"))
+    inside = kept or sorted(one.parent for one in folder.glob(f"*/{DESCRIPTION}"))
+    if inside:
+        some = " or ".join(map(str, inside[:SHOWN])) + (
+            f" or one of {len(inside) - SHOWN} more" * (len(inside) > SHOWN)
+        )
+        return f"{folder} is no policy itself, but has policies in it: give {some}"
+    return f"there is no policy in {folder}: it has no {DESCRIPTION}, as folders have that `caster-gym train` writes"
+
+
+def _read_weights(path: Path) -> dict[str, torch.Tensor]:
+    try:
+        return load_file(path)
+    except FileNotFoundError:
+        raise ConfigurationError(f"there is no file {str(path)!r}") from None
+    except (SafetensorError, OSError) as error:
+        raise ConfigurationError(f"{path} holds no weights: {error}") from error
+
+
+def _fill(actor: Actor, weights: Mapping[str, torch.Tensor], path: Path) -> None:
+    """Give an actor weights of the right names, shapes and type."""
+    wanted = actor.state_dict()
+    for name in sorted(wanted.keys() ^ weights.keys()):
+        raise ConfigurationError(f"{path}: weight {name!r} is {'missing' if name in wanted else 'not known'}")
+    for name, tensor in weights.items():
+        if tensor.shape != wanted[name].shape or tensor.dtype != wanted[name].dtype:
+            raise ConfigurationError(
+                f"{path}: weight {name!r} must be {tuple(wanted[name].shape)} {wanted[name].dtype}, "
+                f"got {tuple(tensor.shape)} {tensor.dtype}"
+            )
+        if not torch.isfinite(tensor).all():
+            raise ConfigurationError(f"{path}: weight {name!r} holds numbers that are not finite")
+    actor.load_state_dict(dict(weights))

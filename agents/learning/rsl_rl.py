@@ -1,0 +1,139 @@
+"""PPO by rsl-rl-lib on robots that are tensors: observations, rewards and networks never leave the device."""
+
+import contextlib
+import io
+import math
+from typing import Any
+
+import torch
+from gymnasium.error import DependencyNotInstalled
+from torch import Tensor
+
+from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.agent_settings import RslPPOSettings
+from caster_gym.agents.learning.tensors import torch_fields
+from caster_gym.agents.learning.training_run import Run
+from caster_gym.envs.tensor.vector_env import TorchVectorEnv
+
+try:
+    from rsl_rl.env import VecEnv
+    from rsl_rl.runners import OnPolicyRunner
+    from tensordict import TensorDict
+except ImportError as error:
+    raise DependencyNotInstalled("rsl-rl-lib is needed for this: pip install 'caster_gym[gpu]'") from error
+
+GROUP = "policy"  # of observations, for actor and critic alike
+CRITIC_WEIGHT, GREATEST_GRADIENT = 0.5, 0.5  # Stable-Baselines3's own, so that both PPOs are the same
+
+
+class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
+    """A `TorchVectorEnv` as rsl-rl-lib wants it. Robots whose episode ends start a new one in the same step."""
+
+    def __init__(self, batch: TorchVectorEnv, seed: int) -> None:
+        self.batch, self.cfg = batch, {"seed": seed}
+        self.num_envs, self.device = batch.num_envs, batch.device
+        (self.num_actions,) = batch.single_action_space.shape
+        self.max_episode_length = int(batch.task.engine.plan.guide.spans[:, 2].max())
+        self._lengths = torch.zeros(self.num_envs, dtype=torch.int64, device=self.device)
+        self._seen, _ = batch.reset(seed=seed)
+
+    @property
+    def episode_length_buf(self) -> Tensor:
+        """Control periods that the present episode of each robot has lasted (robots,)."""
+        return self._lengths
+
+    @episode_length_buf.setter
+    def episode_length_buf(self, lengths: Tensor) -> None:
+        raise AttributeError(
+            "an episode is as long as its path: learn with init_at_random_ep_len=False, got lengths to begin with"
+        )
+
+    def get_observations(self) -> TensorDict:
+        """What the robots see now."""
+        return TensorDict({GROUP: self._seen}, batch_size=[self.num_envs], device=self.device)
+
+    def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
+        """Observations, rewards, ends of episodes (1 or 0), and which of them were only a matter of time."""
+        self._seen, rewards, terminated, truncated, infos = self.batch.step(actions)
+        ended = terminated | truncated
+        self._lengths = torch.where(ended, 0, self._lengths + 1)
+        log = {"/position_error": infos["position_error"]}
+        return self.get_observations(), rewards, ended.long(), {"time_outs": truncated & ~terminated, "log": log}
+
+
+def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> OnPolicyRunner:
+    """rsl-rl-lib's PPO with our settings, its networks begun as Stable-Baselines3 begins them."""
+    torch.manual_seed(seed)
+    network = {"class_name": "MLPModel", "hidden_dims": list(settings.hidden), "activation": "relu"}
+    spread = {
+        "class_name": "GaussianDistribution",
+        "init_std": math.exp(settings.initial_log_std),
+        "std_type": "log",
+    }
+    configuration = {
+        "num_steps_per_env": settings.horizon,
+        "check_for_nan": False,  # the robots' step never returns any, and to look would wait for the device
+        "obs_groups": {"actor": [GROUP], "critic": [GROUP]},
+        "actor": {**network, "distribution_cfg": spread},
+        "critic": network,
+        "algorithm": {
+            "class_name": "PPO",
+            "num_learning_epochs": settings.epochs,
+            "num_mini_batches": settings.robots * settings.horizon // settings.batch,
+            "clip_param": settings.clip,
+            "gamma": settings.discount,
+            "lam": settings.trace,
+            "value_loss_coef": CRITIC_WEIGHT,
+            "entropy_coef": settings.entropy,
+            "learning_rate": settings.learning_rate,
+            "max_grad_norm": GREATEST_GRADIENT,
+            "use_clipped_value_loss": False,
+            "schedule": "fixed",
+            "normalize_advantage_per_mini_batch": True,
+        },
+    }
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints its networks
+        runner = OnPolicyRunner(environment, configuration, log_dir=None, device=str(environment.device))
+    for model, gain in ((runner.alg.actor, 0.01), (runner.alg.critic, 1.0)):
+        gains = [math.sqrt(2.0)] * (len(model.mlp) - 1)
+        model.mlp.init_weights([*gains, gain])
+    return runner
+
+
+def actor_of(runner: OnPolicyRunner, settings: RslPPOSettings) -> Actor:
+    """The deterministic part of the policy, with a copy of its weights on the CPU."""
+    linear = [layer for layer in runner.alg.get_policy().mlp if isinstance(layer, torch.nn.Linear)]
+    actor = Actor(linear[0].in_features, settings.hidden, linear[-1].out_features, "clip")
+    for ours, theirs in zip([*actor.layers, actor.head], linear, strict=True):
+        ours.load_state_dict({name: tensor.detach().cpu().clone() for name, tensor in theirs.state_dict().items()})
+    return actor
+
+
+def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
+    """Train on tensors."""
+    environment = RslVecEnv(
+        TorchVectorEnv(
+            run.task.environment,
+            settings.robots,
+            device=settings.device,
+            compile=settings.compile,
+            **torch_fields(run.task),
+            **run.task.task.model_dump(),
+        ),
+        run.seed,
+    )
+    runner = make_runner(settings, environment, run.seed)
+    steps, round_ = 0, settings.robots * settings.horizon
+    try:
+        while steps < settings.steps:
+            run.advance(steps, lambda: actor_of(runner, settings))
+            rate = settings.learning_rate * (1.0 - steps / settings.steps if settings.falling else 1.0)
+            runner.alg.learning_rate = rate
+            for group in runner.alg.optimizer.param_groups:
+                group["lr"] = rate
+            runner.learn(1)
+            steps += round_
+            std = runner.alg.get_policy().distribution.log_std_param.detach().exp().mean().item()
+            run.record(steps, {"train/learning_rate": rate, "train/std": std})
+    finally:
+        run.finish(steps, lambda: actor_of(runner, settings))

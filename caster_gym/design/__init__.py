@@ -1,0 +1,1 @@
+"""Which robot suits a task: sizes of motors, places of casters, isotropy."""

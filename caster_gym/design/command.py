@@ -1,0 +1,247 @@
+"""The command `design`: the radius and trail that suit a target best, and the motors that it needs."""
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import field_validator
+
+from caster_gym.configuration import parse, read_yaml
+from caster_gym.design.figures import write_design_figure
+from caster_gym.design.search import Design, DesignTarget, check_designable, optimise
+from caster_gym.design.sizing import MotorRequirement, Requirement, require
+from caster_gym.design.target import driven_as
+from caster_gym.file_names import NameOrFile, from_working_folder, with_files_beside
+from caster_gym.report.provenance import write_provenance
+from caster_gym.report.run_folder import check_free, staged
+from caster_gym.robot import Robot, load_robot
+from caster_gym.shipped_files import find
+
+COLUMNS = (
+    "joint",
+    "torque_Nm",
+    "speed_rad_s",
+    "power_W",
+    "smallest_motor_torque_Nm",
+    "smallest_motor_speed_rad_s",
+    "file_torque_Nm",
+    "file_speed_rad_s",
+    "file_power_W",
+    "use",
+    "enough",
+    "use_before",
+)
+OBJECTIVES = {
+    "isotropy": "global isotropy (1 is best)",
+    "torque": "largest motor torque, as a share of that in the file",
+    "use": "largest share of the torque that a motor has at its speed (1 is the limit)",
+}
+MEANINGS = {
+    "isotropy": (
+        "Isotropy is the mean over the steering angles of σ_min/σ_max of the driven joints' rates, as shares of the "
+        "top speeds of their motors in the file, against velocities, as shares of the speed and yaw rate asked for."
+    ),
+    "torque": (
+        "The torque of each motor counts as a share of its `max_torque` in the robot file, so that unlike motors can "
+        "be compared; the margin is included. How fast the motors turn is not weighed: `objective: use` does."
+    ),
+    "use": "The margin is included; what a motor has is taken from the robot file.",
+}
+
+
+class DesignSettings(DesignTarget):
+    """A target, and the robot that is to meet it."""
+
+    robot: NameOrFile = "chung2008"  # name, or path of a YAML file
+
+    _files_beside = field_validator("paths", mode="before")(with_files_beside)
+
+
+@dataclass(frozen=True)
+class DesignReport:
+    """A design, and what the target asks of the motors before and after."""
+
+    settings: DesignSettings
+    original: Robot  # with the joints driven that the target names
+    design: Design
+    before: Requirement
+    after: Requirement
+
+
+def read_design(
+    target: str | Path, robot: str | None = None, changes: Mapping[str, Any] | None = None
+) -> DesignSettings:
+    """Settings from a name in configs/designs or a YAML file, with some of them changed.
+
+    Raises ValueError for settings that are wrong by themselves, and for those with which the robot cannot be designed.
+    """
+    path = find("designs", target)
+    given = {**(changes or {}), **({} if robot is None else {"robot": robot})}
+    source = f"{path}, as changed" if given else str(path)
+    settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, source, path.parent)
+    check_designable(load_robot(settings.robot), settings)
+    return settings
+
+
+def design(settings: DesignSettings, out: Path, overwrite: bool, report: Callable[[float], None]) -> str:
+    """What the command does: all results in the folder `out`, or, if anything goes wrong, none; returns them in words.
+
+    report is told the share of the work that is done.
+    """
+    check_free(out, overwrite, kept=Path(settings.robot))
+    with staged(out, overwrite) as folder:
+        made = make_design(settings, report)
+        write_design(made, folder)
+    return in_words(made)
+
+
+def make_design(settings: DesignSettings, report: Callable[[float], None] = lambda share: None) -> DesignReport:
+    """The best design and the requirements; report is told the share of the work that is done."""
+    original = driven_as(load_robot(settings.robot), settings)
+    design = optimise(original, settings, report)
+    before = require(original, settings, design.motions)
+    return DesignReport(settings, original, design, before, require(design.robot, settings, design.motions))
+
+
+def write_design(report: DesignReport, folder: Path) -> str:
+    """design.md, motors.csv, design.png, robot.yaml and run.yaml in a folder; returns the page."""
+    text = page(report)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_design_figure(folder / "design.png", report.settings, report.design, report.after)
+    with (folder / "motors.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for motor, earlier in zip(report.after.motors, report.before.motors, strict=True):
+            writer.writerow(_row(motor, earlier))
+    (folder / "robot.yaml").write_text(robot_yaml(report), encoding="utf-8")
+    write_provenance(folder, settings=report.settings.model_dump(mode="json"))
+    (folder / "design.md").write_text(text, encoding="utf-8")
+    return text
+
+
+def in_words(report: DesignReport) -> str:
+    """The result in a sentence or two."""
+    best, (radius, trail, value) = report.design, report.design.own
+    lacking = [motor.joint for motor in report.after.motors if not motor.enough]
+    return (
+        f"Wheels of {1e3 * best.radius:.1f} mm radius instead of {1e3 * radius:.1f} mm, with a trail of "
+        f"{1e3 * best.trail:.1f} mm instead of {1e3 * trail:.1f} mm: {OBJECTIVES[report.settings.objective]} "
+        f"{_use_words(best.value, 3)} instead of {_use_words(value, 3)}. "
+        + (f"Its motors are too weak at {', '.join(lacking)}." if lacking else "Its motors are strong enough.")
+    )
+
+
+def robot_yaml(report: DesignReport) -> str:
+    """The robot file of the design: the original with another radius and trail. `load_robot` gives the same robot."""
+    content = report.design.robot.model_dump(mode="json", exclude_none=True)
+    header = (
+        f"# {report.original.name} with wheels of {1e3 * report.design.radius:.1f} mm radius and "
+        f"{1e3 * report.design.trail:.1f} mm trail, by `caster-gym design`; its motors are those of the original.\n"
+    )
+    return header + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+
+
+def page(report: DesignReport) -> str:
+    """The results in Markdown."""
+    settings, design = report.settings, report.design
+    sizes = [("as it was", *design.own), ("**best**", design.radius, design.trail, design.value), *design.nearby]
+    lines = [
+        f"# A design for {report.original.name}",
+        "",
+        f"Asked for: {settings.speed:g} m/s in every direction with {settings.yaw_rate:g} rad/s; accelerations of "
+        f"{settings.acceleration:g} m/s² and {settings.yaw_acceleration:g} rad/s² up to "
+        f"{100 * settings.accelerating_up_to:g} % of these speeds; starts from rest with the casters at any angle"
+        f"{_payload_words(settings)}{_path_words(settings)}. Driven: {', '.join(report.original.driven)}. "
+        f"Margin on torque and speed: {settings.margin:g}.",
+        "",
+        f"| | radius [mm] | trail [mm] | {OBJECTIVES[settings.objective]} |",
+        "|---|---|---|---|",
+        *(f"| {words} | {1e3 * r:.1f} | {1e3 * d:.1f} | {_use_words(value, 3)} |" for words, r, d, value in sizes),
+        "",
+        f"{MEANINGS[settings.objective]} {_bound_words(design)}{_speed_words(report)}",
+        "",
+        "![objective over radius and trail; motors asked for and there](design.png)",
+        "",
+        "## Motors",
+        "",
+        "Greatest torque, speed and power, margin included, of each motor as the robot file counts it. The smallest "
+        "motor is the one of least standstill torque times top speed whose line, falling from that torque to zero at "
+        "that speed, lies above all that is asked. Use is what is asked over what the file's motor has left at its "
+        "speed; 1 is the limit.",
+        "",
+        "| motor | torque [N m] | speed [rad/s] | power [W] | smallest motor | in the file | before | use | enough |",
+        "|---|---|---|---|---|---|---|---|---|",
+        *map(_motor_line, report.after.motors, report.before.motors),
+        "",
+        f"{report.after.factor:.2f} times all torques of the file, with the top speeds of the smallest motors, would "
+        "do. The motors share the work with the least sum of squared shares, as paths are checked by; so, without "
+        f"margin, the one that works hardest gives {100 * report.after.share:.0f} % of its standstill torque in the "
+        f"envelope. No way of sharing needs less than {100 * report.after.least_share:.0f} %.",
+        "",
+        "`robot.yaml` is the robot with the best radius and trail, and with the motors of the original.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _bound_words(design: Design) -> str:
+    if not design.bounds:
+        return "The best design lies inside the bounds."
+    return f"The best design lies at {' and at '.join(design.bounds)}: beyond it there may be better ones."
+
+
+def _speed_words(report: DesignReport) -> str:
+    """What the least torque costs in speed."""
+    if report.settings.objective != "torque":
+        return ""
+    fastest, earlier = (
+        max(requirement.motors, key=lambda motor: motor.speed / motor.has_speed)
+        for requirement in (report.after, report.before)
+    )
+    return (
+        f" Less torque has its price in speed: with the margin, the motor of {fastest.joint} turns at up to "
+        f"{fastest.speed:.3g} rad/s, {100 * fastest.speed / fastest.has_speed:.0f} % of its top speed in the file; as "
+        f"the robot was, the fastest by that measure turns at {earlier.speed:.3g} rad/s, "
+        f"{100 * earlier.speed / earlier.has_speed:.0f} %."
+    )
+
+
+def _payload_words(settings: DesignSettings) -> str:
+    load = settings.payload
+    return f"; a payload of {load.mass:g} kg at ({load.com[0]:g}, {load.com[1]:g}) m" if load else ""
+
+
+def _path_words(settings: DesignSettings) -> str:
+    return f"; the paths {', '.join(path.shape for path in settings.paths)}" if settings.paths else ""
+
+
+def _motor_line(motor: MotorRequirement, earlier: MotorRequirement) -> str:
+    return (
+        f"| {motor.joint} | {motor.torque:.3g} | {motor.speed:.3g} | {motor.power:.3g} "
+        f"| {motor.standstill_torque:.3g} N m, {motor.top_speed:.3g} rad/s "
+        f"| {motor.has_torque:.3g} N m, {motor.has_speed:.3g} rad/s "
+        f"| {_use_words(earlier.use)} | {_use_words(motor.use)} | {'yes' if motor.enough else '**no**'} |"
+    )
+
+
+def _use_words(use: float, digits: int = 2) -> str:
+    return "too fast" if use == float("inf") else f"{use:.{digits}f}"
+
+
+def _row(motor: MotorRequirement, earlier: MotorRequirement) -> tuple[str | float | bool, ...]:
+    return (
+        motor.joint,
+        motor.torque,
+        motor.speed,
+        motor.power,
+        motor.standstill_torque,
+        motor.top_speed,
+        motor.has_torque,
+        motor.has_speed,
+        motor.has_power,
+        motor.use,
+        motor.enough,
+        earlier.use,
+    )

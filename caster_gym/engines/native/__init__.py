@@ -1,0 +1,1 @@
+"""The mechanics compiled by Numba, for one robot or many."""

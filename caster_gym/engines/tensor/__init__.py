@@ -1,0 +1,1 @@
+"""The mechanics on Torch's tensors."""

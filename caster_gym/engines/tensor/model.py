@@ -1,0 +1,55 @@
+"""The mechanics on Torch tensors, eagerly and with gradients."""
+
+import reprlib
+from typing import Any
+
+import torch
+
+from caster_gym.engines.numpy_model import Model
+from caster_gym.engines.tensor.scalars import checked_device, checked_dtype
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters
+from caster_gym.robot import Robot
+
+
+class TorchModel(Model):
+    """`caster_gym.Model` for tensors of one floating-point type on one device; gradients pass through every method.
+
+    parameters may hold tensors, so that gradients with respect to the robot's own numbers exist too. Values are not
+    checked for being finite, since that would wait for the device.
+    """
+
+    _arrays: Any = torch
+
+    def __init__(
+        self,
+        robot: Robot,
+        dynamics: Dynamics = "exact",
+        parameters: RobotParameters | None = None,
+        dtype: torch.dtype = torch.float64,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        super().__init__(robot, dynamics, parameters)
+        self.dtype = checked_dtype(dtype)
+        self.device = checked_device(device)
+
+    def _replaced(self, parameters: RobotParameters) -> None:
+        """Numbers given in place of the robot's own may be tensors whose values nobody may ask for."""
+
+    def _array(self, name: str, value: Any, last: int) -> Any:
+        tensor = self._numbers(name, value)
+        self._check_shape(name, tensor, last)
+        return tensor
+
+    def _numbers(self, name: str, value: Any) -> Any:
+        try:
+            return torch.as_tensor(value, dtype=self.dtype, device=self.device)
+        except (ValueError, TypeError, RuntimeError) as error:  # the last of None, whose type it cannot infer
+            raise ValueError(f"{name} must hold real numbers, got {reprlib.repr(value)}") from error
+
+    def _scalar(self, value: Any) -> Any:
+        return value
+
+    def _stack(self, parts: Any, axis: int = -1) -> Any:
+        tensors = [torch.as_tensor(part, dtype=self.dtype, device=self.device) for part in parts]
+        # Torch ships this one function without types
+        return torch.stack(torch.broadcast_tensors(*tensors), axis)  # type: ignore[no-untyped-call]

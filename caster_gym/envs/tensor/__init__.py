@@ -1,0 +1,1 @@
+"""The life of a step on Torch's tensors."""

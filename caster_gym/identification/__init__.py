@@ -1,0 +1,1 @@
+"""What numbers a robot really has, from recordings of its motion."""

@@ -1,0 +1,272 @@
+"""A page that puts what a paper prints beside what we compute: numbers with verdicts, tables, figures, differences.
+
+A paper's page is made of sections, each built by a function of its own. The files are
+
+    NAME.md                  the page
+    NAME/*.png, *.csv        its figures and tables, and checks.csv: every verdict, own = True where it is our own
+    NAME/differences.csv     where the paper and we differ, of which nature that is, with the evidence
+    differences.md           all differences of all papers whose folders are there, and what was repaired in the scans
+"""
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
+
+from papers.scans import REPAIRS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Nature: TypeAlias = Literal["print", "scan, probably", "scan, possibly", "reading"]
+
+LONGEST_TABLE = 40  # rows that a page shows; a longer table is a file only
+DOTS_PER_INCH = 110
+
+
+class Check(NamedTuple):
+    """One thing that a paper prints, beside ours; or one of our own, beside what it must be."""
+
+    what: str
+    printed: str  # or expected, if the check is our own
+    ours: str
+    agrees: bool
+    remark: str = ""  # why they differ, or what the agreement rests on
+    own: bool = False  # nothing that the paper prints: it stands and counts apart
+
+
+class Table(NamedTuple):
+    """Rows of words and numbers; always a file, and on the page if it is short."""
+
+    name: str  # of its file, without .csv; unique in a paper
+    caption: str
+    columns: tuple[str, ...]
+    rows: Sequence[Sequence[str | float]]
+
+
+class Picture(NamedTuple):
+    """A drawn figure."""
+
+    name: str  # of its file, without .png; unique in a paper
+    title: str  # a few words for who cannot see it
+    caption: str
+    figure: "Figure"
+
+
+class Difference(NamedTuple):
+    """A place where a paper and we differ.
+
+    nature: "print" if mathematics shows that the statement itself is wrong, however well it was scanned; "scan, …" if
+    one lost or changed character of the scanned text would explain it; "reading" if the statement holds in one
+    sense and fails in another, so that it is no error of the paper.
+    """
+
+    tag: str  # E1, E2, …
+    where: str
+    printed: str
+    ours: str
+    evidence: str  # what was measured that decides
+    nature: Nature = "print"
+
+
+class Section(NamedTuple):
+    """A part of a page."""
+
+    title: str
+    text: str  # Markdown
+    checks: tuple[Check, ...] = ()
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    differences: tuple[Difference, ...] = ()
+
+
+def printed_checks(sections: Iterable[Section]) -> tuple[Check, ...]:
+    """The checks of what the paper prints, without those of our own."""
+    return tuple(check for section in sections for check in section.checks if not check.own)
+
+
+def named(check: Check) -> tuple[str, ...]:
+    """Tags of the differences that a check's remark names."""
+    return tuple(re.findall(r"E\d+", check.remark))
+
+
+def depends_on_reading(check: Check, sections: Iterable[Section]) -> bool:
+    """Does a check fail only in one reading of what the paper says?"""
+    readings = {d.tag for section in sections for d in section.differences if d.nature == "reading"}
+    return not check.agrees and not check.own and bool(readings.intersection(named(check)))
+
+
+def summary(sections: Sequence[Section]) -> str:
+    """How many printed numbers and statements agree, and to how many differences the others come down."""
+    printed = printed_checks(sections)
+    tags = {d.tag for section in sections for d in section.differences}
+    unclear = [check for check in printed if depends_on_reading(check, sections)]
+    failed = [check for check in printed if not check.agrees and check not in unclear]
+    words = f"{sum(check.agrees for check in printed)} of {len(printed)} printed numbers and statements agree"
+    for checks, one, several in (
+        (failed, "differs", "differ"),
+        (unclear, "depends on the reading", "depend on the reading"),
+    ):
+        if checks:
+            causes = sorted({tag for check in checks for tag in named(check) if tag in tags}, key=_number)
+            reasons = f"{len(causes)} reason{'s' if len(causes) > 1 else ''} ({', '.join(causes)})"
+            words += f"; {len(checks)} {one if len(checks) == 1 else several}, for {reasons}"
+    return words
+
+
+def _number(tag: str) -> int:
+    return int(tag.removeprefix("E"))
+
+
+def unexplained(sections: Sequence[Section]) -> tuple[str, ...]:
+    """What the checks say that fail without naming, in their remark, a difference of these sections."""
+    tags = {difference.tag for section in sections for difference in section.differences}
+    failed = (check for section in sections for check in section.checks if not check.agrees)
+    return tuple(check.what for check in failed if tags.isdisjoint(named(check)))
+
+
+def check_number(what: str, printed: str, ours: float, tolerance: float | None = None, remark: str = "") -> Check:
+    """Compare a number with its printed digits; agreement is within half a unit of the last, or a given tolerance."""
+    allowed = _half_unit(printed) if tolerance is None else tolerance
+    agrees = math.isfinite(ours) and abs(ours - float(printed)) <= allowed * (1.0 + 1e-9)
+    digits = max(0, -math.floor(math.log10(2.0 * _half_unit(printed)) + 0.5)) + 1
+    return Check(what, printed, f"{ours:.{digits}f}", agrees, remark)
+
+
+def write_page(name: str, title: str, reference: str, sections: Sequence[Section], folder: Path) -> str:
+    """Put figures and tables of a paper in a folder; returns the page that stands beside the folder.
+
+    Raises ValueError if two tables or two figures have the same name.
+    """
+    for names in ([t.name for s in sections for t in s.tables], [p.name for s in sections for p in s.pictures]):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"two tables or figures of {name} are called {twice[0]!r}")
+    for section in sections:
+        for table in section.tables:
+            _write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
+        for picture in section.pictures:
+            picture.figure.savefig(folder / f"{picture.name}.png", dpi=DOTS_PER_INCH)
+    _write_csv(folder / "checks.csv", Check._fields, [check for section in sections for check in section.checks])
+    _write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
+    return _page(name, title, reference, sections)
+
+
+def differences_page(out: Path, names: Sequence[str]) -> str:
+    """The page of all differences, of all papers whose folders are there, parted by their nature."""
+    rows: list[list[str]] = []
+    there = [name for name in names if (out / name / "differences.csv").is_file()]
+    for name in there:
+        with (out / name / "differences.csv").open(encoding="utf-8", newline="") as lines:
+            rows += [[row["tag"], f"[{name}]({name}.md)", *list(row.values())[1:]] for row in csv.DictReader(lines)]
+    rows.sort(key=lambda row: _number(row[0]))
+    columns = ("", "paper", "where", "as printed", "correct", "evidence")
+    parts = ["# Where the papers and we differ", _ABOUT_SCANS]
+    for title, text, natures in _PARTS:
+        chosen = [row for row in rows if row[-1] in natures]
+        if chosen:
+            count = len({row[0] for row in chosen})
+            both = len(natures) > 1
+            table = [[*row[:-1], row[-1].removeprefix("scan, ")] if both else row[:-1] for row in chosen]
+            parts += [
+                f"## {title} ({count})",
+                text,
+                markdown_table((*columns, "the scan's fault") if both else columns, table),
+            ]
+    repairs = [(f"[{name}]({name}.md)", *repair) for name in there for repair in REPAIRS.get(name, ())]
+    if repairs:
+        text = "What could be read in one way only was repaired and is counted nowhere."
+        parts += [
+            "## Repaired without counting",
+            text,
+            markdown_table(("paper", "where", "as scanned", "read as"), repairs),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+_ABOUT_SCANS = """\
+The source of both papers is a scanned text, not the print. Character recognition loses signs, dots and indices, and so
+some of what follows may stand correctly in print. The list is therefore parted by what can be known from the scan. Each
+entry stands with the evidence that decides, as measured by `python -m papers`; an entry with several rows was
+measured in several ways and counts once."""
+_PARTS: tuple[tuple[str, str, tuple[Nature, ...]], ...] = (
+    (
+        "What the print must have wrong",
+        "Shown by mathematics: no single misread character would mend the statement.",
+        ("print",),
+    ),
+    (
+        "What the scan may have garbled",
+        "One lost or changed character would explain the difference, and the print may well be right. The scan is "
+        "probably at fault where the text around it states the right thing, or where characters of that kind are often "
+        "lost; it is possibly at fault where a wrong sign or letter makes a formula that looks whole.",
+        ("scan, probably", "scan, possibly"),
+    ),
+    (
+        "What depends on the reading",
+        "These statements hold in one sense and fail in another. They are no errors of the papers.",
+        ("reading",),
+    ),
+)
+assert {nature for _, _, natures in _PARTS for nature in natures} == set(get_args(Nature))
+
+
+def _page(name: str, title: str, reference: str, sections: Sequence[Section]) -> str:
+    own = [check for section in sections for check in section.checks if check.own]
+    told = (
+        f"{summary(sections)}. The reason stands beside each, and [differences.md](differences.md) lists all reasons "
+        "with the evidence. The source is a scanned text: the list says what the scan may have garbled."
+    )
+    if own:
+        told += (
+            f" Checks of our own, among them those on other robots than the paper's, stand apart; "
+            f"{sum(check.agrees for check in own)} of {len(own)} hold."
+        )
+    told += f" Made by `python -m papers {name}`."
+    parts = [f"# {title}", reference, told]
+    for section in sections:
+        parts += [f"## {section.title}", section.text.strip()]
+        parts += _verdicts([check for check in section.checks if not check.own], ("what", "printed", "ours"), sections)
+        own = [check for check in section.checks if check.own]
+        parts += ["Checks of our own:"] * bool(own) + _verdicts(own, ("what", "expected", "found"), sections)
+        for table in section.tables:
+            parts.append(f"{table.caption} ([{table.name}.csv]({name}/{table.name}.csv))")
+            if len(table.rows) <= LONGEST_TABLE:
+                parts.append(markdown_table(table.columns, table.rows))
+        for picture in section.pictures:
+            parts += [f"![{picture.title}]({name}/{picture.name}.png)", f"*{picture.caption}*"]
+    return "\n\n".join(parts) + "\n"
+
+
+def _verdicts(checks: Sequence[Check], columns: tuple[str, str, str], sections: Sequence[Section]) -> list[str]:
+    """A table of checks, if there are any."""
+    rows = [(c.what, c.printed, c.ours, _verdict(c, sections), c.remark) for c in checks]
+    return [markdown_table((*columns, "verdict", "remark"), rows)] if rows else []
+
+
+def _verdict(check: Check, sections: Sequence[Section]) -> str:
+    if check.agrees:
+        return "pass"
+    return "depends on the reading" if depends_on_reading(check, sections) else "**fail**"
+
+
+def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]]) -> str:
+    """A table in Markdown; numbers with four significant digits."""
+    lines = [[*columns], ["---"] * len(columns)]
+    lines += [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def _half_unit(printed: str) -> float:
+    """Half a unit of the last printed digit of a number."""
+    mantissa, _, exponent = printed.lower().partition("e")
+    return 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+
+
+def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)

@@ -1,0 +1,45 @@
+"""Files that come with the package, by kind and name: tasks, agents, designs, benchmarks."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+from caster_gym.configuration import ConfigurationError, is_yaml, parse, read_yaml
+
+Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def names_of(kind: str) -> list[str]:
+    """Names of the tasks, agents, designs or benchmarks that come with the package."""
+    return sorted(file.stem for file in _folder_of(kind).glob("*.yaml"))
+
+
+def _folder_of(kind: str) -> Path:
+    return Path(str(files("caster_gym.configs"))) / kind
+
+
+def find(kind: str, name: str | Path) -> Path:
+    """The file of a task, agent, design or benchmark: one that comes with the package, by its name, or a path."""
+    if is_yaml(name):
+        path = Path(name).expanduser()
+        if not path.exists() and path.stem in names_of(kind):
+            raise ConfigurationError(
+                f"there is no file {str(name)!r}; what comes with the package is called {path.stem!r}"
+            )
+        return path
+    name = str(name)
+    if name not in names_of(kind):
+        own = next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
+        known = f"known are {', '.join(names_of(kind))}, or give the path of a YAML file"
+        raise ConfigurationError(
+            f"there is no {name!r} in {kind}; {f'did you mean the file {own!r}?' if own else known}"
+        )
+    return _folder_of(kind) / f"{name}.yaml"
+
+
+def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:
+    """Checked settings from a file that `find` finds."""
+    path = find(kind, name)
+    return parse(model, read_yaml(path), str(path), path.parent)

@@ -1,0 +1,1 @@
+"""Analysis that only the papers need."""

@@ -1,0 +1,259 @@
+"""agents.comparison.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
+
+import csv
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_array_equal
+
+from caster_gym.agents.comparison import benchmark
+from caster_gym.agents.comparison.benchmark import (
+    Contender,
+    Job,
+    compare,
+    read_comparison,
+    read_history,
+    run_benchmark,
+    train_all,
+    tune,
+)
+from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
+from caster_gym.agents.comparison.follow_metrics import FollowMetrics, FollowVerdict
+from caster_gym.agents.comparison.track_metrics import TrackMetrics, TrackVerdict, measure
+from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.agents.learning.agent_settings import ComputedTorqueSettings, read_agent
+from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.training_run import VALIDATION_SEED
+from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.configuration import ConfigurationError
+from caster_gym.shipped_files import read_settings
+
+test_batch.__test__ = False  # a name that pytest would take for a test
+
+SEEDS = [2, 5]
+STARTS = 2
+PATHS = 3
+RANDOM = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3}
+PPO = {"algorithm": "ppo", "steps": 9999, "hidden": [8], "robots": 8, "horizon": 32, "batch": 64, "validations": 2}
+FREQUENCIES = [1.0, 15.0]
+
+
+def write(folder, name, content):
+    file = folder / f"{name}.yaml"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return str(file)
+
+
+def rows(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("configs")
+    task = {
+        "train": [{**RANDOM, "seed": 0, "count": 4}],
+        "validation": [{**RANDOM, "seed": 1, "count": 3}],
+        "test": [{**RANDOM, "seed": 2, "count": PATHS}],
+    }
+    controller = {"algorithm": "computed torque", "natural_frequencies": FREQUENCIES}
+    return BenchmarkSettings(
+        task=write(folder, "task", task),
+        agents=(write(folder, "controller", controller), write(folder, "ppo", PPO)),
+        seeds=tuple(SEEDS),
+        starts=STARTS,
+        settling=1.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def task(settings):
+    return read_settings(TaskSettings, "tasks", settings.task)
+
+
+@pytest.fixture(scope="module")
+def finished(settings, tmp_path_factory):
+    """Folder and table of a small comparison: a controller and two seeds of a learned agent."""
+    folder = tmp_path_factory.mktemp("benchmark")
+    return folder, run_benchmark(read_comparison(settings, {"steps": 512}), folder)
+
+
+def test_a_comparison_leaves_everything_behind(finished):
+    folder, text = finished
+    assert (folder / "table.md").read_text(encoding="utf-8") == text + "\n"
+    assert "computed torque" in text
+    assert "PPO, 2 seeds" in text
+    for name in ("paths", "errors", "torques", "learning", "overview"):
+        picture = (folder / f"{name}.png").read_bytes()
+        assert picture.startswith(b"\x89PNG")
+        assert len(picture) > 5000  # an empty picture of that size has less
+    episodes = rows(folder / "episodes.csv")
+    assert len(episodes) == (1 + len(SEEDS)) * PATHS * STARTS
+    assert [(row["agent"], row["seed"]) for row in episodes[:: PATHS * STARTS]] == [
+        ("computed torque", ""),
+        *[("PPO", str(seed)) for seed in SEEDS],
+    ]
+    assert len(rows(folder / "summary.csv")) == 2 * len(TrackMetrics._fields)
+
+
+def test_run_yaml_holds_what_the_comparison_was(finished, settings):
+    folder, _ = finished
+    facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
+    assert BenchmarkSettings(**facts["benchmark"]) == settings
+    assert {"versions", "command", "task", "robot"} <= set(facts)
+    controller, learner = (Path(agent).stem for agent in settings.agents)
+    assert facts["agents"][learner]["steps"] == 512  # the change, not the file's
+    assert facts["natural_frequencies"] == {controller: 15.0}
+
+
+def test_every_seed_is_trained_for_itself(finished):
+    folder, _ = finished
+    policies = sorted(file.parent for file in (folder / "policies").rglob("run.yaml"))
+    assert len(policies) == len(SEEDS)
+    seeds = [load_bundle(policy / "best").description.trained_with["seed"] for policy in policies]
+    assert sorted(seeds) == SEEDS
+    for policy in policies:
+        history = read_history(policy, TrackVerdict)
+        assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
+        assert history[-1].steps == 512
+
+
+def test_episodes_can_be_measured_again_from_the_policies(finished, settings, task):
+    """The numbers of each seed are those of its policy on the same starts."""
+    folder, _ = finished
+    batch = test_batch(task, task.test, STARTS)
+    for policy in (file.parent for file in (folder / "policies").rglob("run.yaml")):
+        bundle = load_bundle(policy / "best")
+        metrics = measure(roll_out(bundle.agent, batch, settings.start_seed), settings.settling)
+        seed = str(bundle.description.trained_with["seed"])
+        written = [row for row in rows(folder / "episodes.csv") if row["seed"] == seed]
+        for name in TrackMetrics._fields:
+            assert_array_equal([float(row[name]) for row in written], getattr(metrics, name), name)
+
+
+class Recorder:
+    """A controller that keeps what it was shown first."""
+
+    def __init__(self, agent, name):
+        self.agent, self.name, self.first = agent, name, None
+
+    def act(self, observations):
+        self.first = observations.copy() if self.first is None else self.first
+        return self.agent.act(observations)
+
+
+def test_all_agents_get_the_same_starts_and_paths(settings, task):
+    batch = test_batch(task, task.test, STARTS)
+    agents = [
+        Recorder(ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period), f"{frequency}")
+        for frequency in (5.0, 10.0)
+    ]
+    results, shown = compare([Contender(agent.name, agent, None) for agent in agents], batch, settings)
+    assert_array_equal(agents[0].first, agents[1].first)
+    assert results[0].paths == results[1].paths == ("random_paths 0", "random_paths 1", "random_paths 2") * STARTS
+    first, second = shown.values()
+    assert_array_equal(first.reference, second.reference)
+    assert np.any(first.pose != second.pose)
+
+
+def test_the_natural_frequency_is_chosen_on_validation_paths(task):
+    """The best of those listed there, whatever would do better elsewhere."""
+    batch = test_batch(task, task.validation, starts=1)
+    listed = (3.0, 30.0, 1.0, 12.0)
+    errors = {}
+    for frequency in listed:
+        agent = ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period)
+        metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
+        errors[frequency] = metrics.position_rmse.mean()
+    settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
+    agent, frequency = tune(settings, batch)
+    assert frequency == min(errors, key=errors.get)
+    assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
+
+
+def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
+    """Here the folder of a run cannot be made, since a file is there."""
+    (tmp_path / "taken").write_text("", encoding="utf-8")
+    agent = read_agent(settings.agents[1], {"steps": 512})
+    with pytest.raises(OSError, match="taken"):
+        train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
+
+
+@pytest.mark.parametrize(("threads", "processes"), [((), 5), ((1,), 5), ((4,), 4), ((64,), 1)])
+def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, threads, processes):
+    """Each training run has one thread or those asked for; cores only say how many run at a time."""
+    pools, submitted = [], []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, workers, mp_context):
+            pools.append(workers)
+            super().__init__(1)
+
+    monkeypatch.setattr(benchmark, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(benchmark, "usable_cores", lambda: 16)
+    monkeypatch.setattr(benchmark, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
+    agent = read_agent(settings.agents[1], {"steps": 512})
+    train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
+    assert pools == [processes]
+    assert submitted == 5 * [threads[0] if threads else 1]
+
+
+def test_run_yaml_has_the_threads_of_everybody(finished):
+    folder, _ = finished
+    files = [folder / "run.yaml", *(folder / "policies").rglob("run.yaml")]
+    assert len(files) == 1 + len(SEEDS)
+    assert all(yaml.safe_load(file.read_text(encoding="utf-8"))["threads"] == 1 for file in files)
+
+
+def test_no_jobs_are_no_work():
+    train_all([])
+
+
+def test_an_unknown_agent_is_told_before_anything_is_trained(tmp_path, settings):
+    other = settings.model_copy(update={"agents": (*settings.agents, "nobody")})
+    with pytest.raises(ConfigurationError, match="there is no 'nobody' in agents; known are computed_torque"):
+        run_benchmark(read_comparison(other), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_following_is_compared_in_the_same_way(tmp_path):
+    """One definition serves both tasks: another table, another figure, the same files."""
+    task = {
+        "environment": "follow",
+        "arena": {"beside": {"pillars": 1, "walls": 1}},
+        "shaping": [{"kind": "tolerance", "quantity": "heading_error", "margin": 0.5}],
+        **{
+            kind: [{"shape": "random_paths", "seed": seed, "count": 2, "reversing": 0.0, "min_radius": 0.3}]
+            for seed, kind in enumerate(("train", "validation", "test"))
+        },
+    }
+    controller = {"algorithm": "computed torque", "natural_frequencies": [10.0]}
+    settings = BenchmarkSettings(
+        task=write(tmp_path, "task", task),
+        agents=(write(tmp_path, "controller", controller), write(tmp_path, "ppo", PPO)),
+        seeds=(2,),
+    )
+    folder = tmp_path / "results"
+    text = run_benchmark(read_comparison(settings, {"steps": 512}), folder)
+    assert "time for the path [s]" in text
+    assert (folder / "speeds.png").read_bytes().startswith(b"\x89PNG")
+    controlled, learned = rows(folder / "episodes.csv")[::2]
+    assert list(controlled)[4:] == list(FollowMetrics._fields)
+    assert (controlled["finished"], controlled["failed"]) == ("1.0", "0.0")
+    assert learned["seed"] == "2"
+    policy = folder / "policies" / "ppo-2"
+    history = read_history(policy, FollowVerdict)
+    assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
+    best = load_bundle(policy / "best").description
+    assert (best.environment, best.wrappers, best.actions) == ("follow", (), 6)
+
+
+def test_computed_torque_is_refused_where_actions_are_no_torques(task):
+    commanded = TaskSettings.model_validate({**task.model_dump(), "wrappers": ["twist_commands"]})
+    settings = ComputedTorqueSettings(algorithm="computed torque")
+    with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
+        tune(settings, test_batch(commanded, commanded.validation, starts=1))

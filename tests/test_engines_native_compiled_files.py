@@ -1,0 +1,175 @@
+"""caster_gym.engines.native.compiled_files and .turns: compiled code on disk, shared by environments and processes."""
+
+import os
+import stat
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from caster_gym.engines.native import compiled_files, turns
+from caster_gym.engines.native.turns import take_turn
+
+DAY = 86400.0
+
+
+@pytest.fixture
+def root(tmp_path, monkeypatch):
+    """The folder chosen for compiled code, and a temporary one of its own."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    monkeypatch.setattr(compiled_files._SETTINGS, "CACHE_DIR", str(tmp_path / "chosen"))
+    return tmp_path / "chosen"
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package with the folders of caster_gym and one file in each."""
+    for folder in ("mechanics", "engines", "envs", "paths"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "one.py").write_text("x = 1\n")
+    monkeypatch.setattr(compiled_files, "_PACKAGE", tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("folder", ["mechanics", "engines", "envs"])
+def test_a_changed_source_is_another_version(package, folder):
+    """Compiled code depends on functions that it calls, in other files."""
+    before = compiled_files.source_digest()
+    assert compiled_files.source_digest() == before
+    (package / folder / "one.py").write_text("x = 2\n")
+    changed = compiled_files.source_digest()
+    (package / folder / "one.py").rename(package / folder / "two.py")
+    assert len({before, changed, compiled_files.source_digest()}) == 3
+
+
+@pytest.mark.parametrize("file", ["paths/one.py", "envs/torch_one.py"])
+def test_sources_that_are_not_compiled_do_not_count(package, file):
+    before = compiled_files.source_digest()
+    (package / file).write_text("x = 2\n")
+    assert compiled_files.source_digest() == before
+
+
+def test_what_is_kept_is_read(root):
+    assert compiled_files.read("step.nbc") is None
+    compiled_files.keep("step.nbc", b"code")
+    assert compiled_files.read("step.nbc") == b"code"
+    assert [file.name for file in (root / compiled_files.version()).iterdir()] == ["step.nbc"]
+
+
+@pytest.mark.parametrize("damage", [b"", b"short", None])
+def test_a_damaged_file_is_as_good_as_none(root, damage):
+    """As after a crash or on a full disk: half of a function would take the process down."""
+    compiled_files.keep("step.nbc", b"code")
+    file = root / compiled_files.version() / "step.nbc"
+    file.write_bytes(file.read_bytes()[:-1] if damage is None else damage)
+    assert compiled_files.read("step.nbc") is None
+
+
+def test_folders_in_their_order(root, tmp_path, monkeypatch):
+    """Chosen, else the user's, then a temporary one that is his alone."""
+    temporary = tmp_path / "temporary" / f"caster_gym-{os.getuid()}"
+    assert list(compiled_files.roots()) == [root, temporary]
+    monkeypatch.setattr(compiled_files._SETTINGS, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    assert next(compiled_files.roots()) == tmp_path / "user" / "caster_gym"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert next(compiled_files.roots()) == tmp_path / "home" / ".cache" / "caster_gym"
+    assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
+
+
+def test_a_cache_that_cannot_be_written_serves_all_the_same(root, tmp_path):
+    """As in a container's image: what is new goes to the temporary folder. (Root writes everywhere, so a file is in the
+    way of what would be new.)"""
+    compiled_files.keep("old.nbc", b"old")
+    (root / compiled_files.version() / "new.nbc").mkdir()
+    compiled_files.keep("new.nbc", b"new")
+    assert compiled_files.read("old.nbc") == b"old"
+    assert compiled_files.read("new.nbc") == b"new"
+    (kept,) = (tmp_path / "temporary").rglob("*.nbc")
+    assert kept.name == "new.nbc"
+
+
+def test_without_any_folder_nothing_is_kept(tmp_path, root, monkeypatch):
+    root.write_text("no folder can be made in a file")
+    monkeypatch.setattr(tempfile, "tempdir", str(root))
+    with pytest.raises(OSError, match="chosen"):
+        compiled_files.keep("step.nbc", b"code")
+    assert compiled_files.read("step.nbc") is None
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o770])
+def test_code_is_not_run_from_a_folder_that_others_can_write(root, tmp_path, mode):
+    foreign = tmp_path / "temporary" / f"caster_gym-{os.getuid()}"
+    foreign.mkdir()
+    foreign.chmod(mode)
+    assert list(compiled_files.roots()) == [root]
+
+
+def test_code_is_not_run_from_a_link(root, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "temporary" / f"caster_gym-{os.getuid()}").symlink_to(tmp_path / "elsewhere")
+    assert list(compiled_files.roots()) == [root]
+
+
+def test_code_of_sources_that_have_changed_since_is_not_kept(root, monkeypatch):
+    """It would be taken for what the new sources say."""
+    monkeypatch.setattr(compiled_files, "SOURCES", "those that were read")
+    compiled_files.keep("step.nbc", b"code")
+    assert compiled_files.read("step.nbc") is None
+
+
+def aged(folder, days):
+    folder.mkdir(parents=True)
+    (folder / "step.nbc").touch()
+    os.utime(folder, (time.time() - days * DAY,) * 2)
+    return folder
+
+
+def test_versions_that_nobody_uses_go(root):
+    """Old ones, and the longest unused of too many; nothing else that lies there."""
+    young = [aged(root / f"cpython-311-{i:016x}", 1.0 + i / 100.0) for i in range(compiled_files.KEPT_VERSIONS + 2)]
+    old = [aged(root / f"cpython-311-{'f' * 16}", 61.0), aged(root / ("0123456789abcdef"), 61.0)]
+    foreign = [aged(root / "of_numba_0123456789abcdef", 99.0), aged(root / "cpython-311", 99.0)]
+    compiled_files.keep("step.nbc", b"code")
+    assert all(folder.exists() for folder in (*young[: compiled_files.KEPT_VERSIONS], *foreign))
+    assert not any(folder.exists() for folder in (*young[compiled_files.KEPT_VERSIONS :], *old))
+    assert compiled_files.read("step.nbc") == b"code"
+
+
+def test_a_version_that_is_read_stays_young(root):
+    compiled_files.keep("step.nbc", b"code")
+    folder = root / compiled_files.version()
+    os.utime(folder, (time.time() - 50 * DAY,) * 2)
+    compiled_files.read("step.nbc")
+    assert time.time() - folder.stat().st_mtime < DAY
+
+
+def test_a_turn_waits_for_the_one_before(tmp_path):
+    """on_waiting ends the first one, without which the second would never come."""
+    first = take_turn(tmp_path / "turn", pytest.fail)
+    waited = []
+
+    def on_waiting():
+        waited.append(True)
+        first.end()
+
+    second = take_turn(tmp_path / "turn", on_waiting)
+    assert waited == [True]
+    second.end()
+    take_turn(tmp_path / "turn", pytest.fail).end()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_whoever_is_stuck_does_not_stop_others_for_ever(tmp_path, monkeypatch):
+    first = take_turn(tmp_path / "turn", pytest.fail)
+    monkeypatch.setattr(turns, "LONGEST_WAIT", 0.0)
+    assert take_turn(tmp_path / "turn", lambda: None) is None
+    first.end()
+
+
+def test_no_turn_where_no_file_can_be_made(tmp_path):
+    (tmp_path / "file").touch()
+    assert take_turn(Path(tmp_path / "file" / "turn"), pytest.fail) is None

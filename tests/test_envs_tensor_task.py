@@ -1,0 +1,101 @@
+"""caster_gym.envs.tensor.task: one control period as a function of tensors."""
+
+import math
+
+import pytest
+import torch
+
+from caster_gym.envs.native import layout
+from caster_gym.envs.tensor.task import TorchTask
+
+CIRCLE = {"shape": "circle", "radius": 0.5}
+
+
+@pytest.fixture(scope="module", params=["track", "follow"])
+def task(request):
+    return TorchTask(request.param, path=CIRCLE)
+
+
+def test_a_step_leaves_the_given_state_as_it_was(task):
+    state, _ = task.begin(torch.arange(3))
+    copies = [tensor.clone() for tensor in state]
+    task.step(state, torch.ones((3, 6)))
+    assert all(torch.equal(tensor, copy) for tensor, copy in zip(state, copies, strict=True))
+
+
+def test_the_same_state_and_actions_give_the_same_outcome(task):
+    state, _ = task.begin(torch.arange(3))
+    for ours, theirs in zip(*(task.step(state, torch.ones((3, 6)))[1] for _ in range(2)), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+def test_only_chosen_robots_start_again(task):
+    state, _ = task.begin(torch.arange(3))
+    state, outcome = task.step(state, torch.ones((3, 6)))
+    chosen = torch.tensor([True, False, True])
+    after, seen = task.restart(state, outcome, chosen)
+    assert after.clocks.tolist() == [0, 1, 0]
+    assert after.episodes.tolist() == [2, 1, 2]
+    assert torch.equal(after.bodies[:, 1], state.bodies[:, 1])
+    assert torch.equal(seen.observations[1], outcome.observations[1])
+    assert torch.equal(seen.rewards, outcome.rewards)
+
+
+def test_a_wrench_pushes_the_robot():
+    """1 N forward for a control period of 20 ms: Δv = F h / M, M between platform and all bodies, 5 and 9 kg."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
+    state, _ = task.begin(torch.arange(1))
+    moved, _ = task.step(state, torch.zeros((1, 6)), torch.tensor([[1.0, 0.0, 0.0]]))
+    speed = math.hypot(moved.bodies[4].item(), moved.bodies[5].item())
+    assert 0.02 / 9.0 < speed < 0.02 / 5.0
+
+
+def test_a_wrench_of_another_shape_is_refused():
+    task = TorchTask("track", path=CIRCLE)
+    state, _ = task.begin(torch.arange(2))
+    with pytest.raises(ValueError, match=r"wrench must have shape \(2, 3\), got \(3,\)"):
+        task.step(state, torch.zeros((2, 6)), torch.ones(3))
+
+
+def test_what_is_seen_at_a_start_depends_on_the_robots_own_numbers():
+    """Its casters' trails scale their observed rates, and more."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
+    trail = torch.full((2,), 0.02, dtype=torch.float64, requires_grad=True)
+    casters = tuple(caster._replace(trail=trail) for caster in task.parameters.casters)
+    task.parameters = task.parameters._replace(casters=casters)
+    _, outcome = task.begin(torch.arange(2))
+    (slope,) = torch.autograd.grad(outcome.report[layout.CONDITIONING].sum(), trail)
+    assert (slope != 0.0).all()
+
+
+@pytest.mark.parametrize("part", ["_move", "_look", "_place"])
+@pytest.mark.parametrize("name", ["track", "follow"])
+def test_each_part_is_one_graph_for_the_compiler(name, part):
+    """So that nothing in it waits for the device; a break of the graph is an error of the compiler."""
+    task = TorchTask(name, path=CIRCLE, dtype=torch.float64)
+    state, _ = task.begin(torch.arange(3))
+    actions = torch.full((3, 6), 0.3)
+    expected = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
+    setattr(task, part, torch.compile(getattr(task, part), fullgraph=True, backend="eager", dynamic=False))
+    seen = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
+    assert torch.equal(seen[0].bodies, expected[0].bodies)
+    assert torch.equal(seen[1].rewards, expected[1].rewards)
+
+
+def gradient(compiled):
+    """Of the rewards of two control periods with respect to the actions."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64, compile=compiled, diagnostics=False)
+    state, _ = task.begin(torch.arange(4))
+    generator = torch.Generator().manual_seed(3)
+    actions = torch.rand((2, 4, 6), generator=generator, dtype=torch.float64).sub(0.5).requires_grad_()
+    rewards = []
+    for action in actions:
+        state, outcome = task.step(state, action)
+        rewards.append(outcome.rewards.sum())
+    torch.stack(rewards).sum().backward()
+    return actions.grad
+
+
+def test_compiled_gradients_are_the_eager_ones():
+    """1e-12 of order 1: the same products in another order; a gradient through a wrong buffer differs by 1e-4."""
+    torch.testing.assert_close(gradient(True), gradient(False), rtol=0.0, atol=1e-12)
