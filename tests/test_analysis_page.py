@@ -17,8 +17,13 @@ def tags(*paths):
 
 
 PAGE = ROOT / "docs" / "analysis.md"
-CODE = sorted((ROOT / "caster_gym" / "analysis").glob("*.py"))
-TESTS = sorted((ROOT / "tests").glob("test_analysis_*.py"))
+FOLDERS = ("caster_gym/analysis", "caster_gym/design", "caster_gym/identification", "papers/analysis")
+CODE = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.py"))
+TESTS = sorted(
+    path
+    for names in ("test_analysis_*.py", "test_design_*.py", "test_identification_*.py", "papers/test_analysis_*.py")
+    for path in (ROOT / "tests").glob(names)
+)
 
 
 def test_every_equation_of_the_code_is_derived_on_the_page():
