@@ -9,11 +9,9 @@ from decimal import Decimal, InvalidOperation
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.units import UNITS, read_unit
-
-Array = NDArray[np.float64]
 
 LATEST_SECONDS = 10**11  # [s] a stamp beyond the year 5000 is one in ms, us or ns
 SPARSEST = 5.0  # [s] between many samples, from which on their times are hardly seconds

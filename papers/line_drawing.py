@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from caster_gym.design.singular_lines import Array, action_lines, kind_and_caster, meeting
+from caster_gym.arrays import Array
+from caster_gym.design.singular_lines import action_lines, kind_and_caster, meeting
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.drawing import COLOURS, draw_robot
 from caster_gym.robot import Robot

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.plausibility import RobotWarning
 from caster_gym.robot import Caster, Footprint, Link, Motor, Platform, Robot, Wheel
 from papers.analysis import joint_kinematics
-
-Array = NDArray[np.float64]
 
 
 class Notation(NamedTuple):

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.robot import Robot
-from papers.notation import CHUNG2008, KIM2001, Array, Lengths, Notation
+from papers.notation import CHUNG2008, KIM2001, Lengths, Notation
 
 Matrix = NDArray[Any]
 Rows = tuple[tuple[Any, Any, Any], ...]

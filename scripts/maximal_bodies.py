@@ -16,11 +16,9 @@ L robots move side by side. Accelerations are inertial ones, their components al
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class FrictionLaw(NamedTuple):

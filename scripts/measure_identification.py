@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from caster_gym.arrays import Array
 from caster_gym.identification.fit import identify
 from caster_gym.identification.recording import Noise, Recording
 from caster_gym.identification.unknowns import robot_with
 from caster_gym.report.page import markdown_table
 from caster_gym.robot import Robot, load_robot
-from scripts.maximal_bodies import Array, FrictionLaw, MaximalBodies
+from scripts.maximal_bodies import FrictionLaw, MaximalBodies
 
 NOISE = Noise(position=1e-3, heading=2e-3, velocity=1e-2, yaw_rate=1e-2, steering=2e-3, rolling=2e-3)
 TRUTH = {"payload_mass": 1.0, "payload_x": 0.03, "payload_y": -0.02, "roll_coulomb": 4e-3, "steer_coulomb": 2e-3}

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym import Model, Robot, load_robot
+from caster_gym.arrays import Array
 from caster_gym.mechanics.ground import CONTACT_TIME, impact_traction, tilt, wheel_loads
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 
@@ -27,8 +27,6 @@ RESTITUTION = 0.5  # of the impacts
 LAG = 0.02  # [s] of motors
 STEP, FINE = 5e-3, 3.125e-4  # [s] time steps whose ends are compared
 SECONDS = 4.0  # that robots are driven for
-
-Array = NDArray[np.float64]
 
 
 class Row(NamedTuple):

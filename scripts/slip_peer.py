@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from caster_gym import Model, Robot, load_robot
+from caster_gym.arrays import Array
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.export.mjcf import mjcf
 from caster_gym.floor import Floor
@@ -32,8 +32,6 @@ from caster_gym.mechanics.slip import rolling_state, slip_step
 from caster_gym.report.drawing import COLOURS, new_figure
 from scripts.mujoco_peer import paragraph, spread
 from scripts.mujoco_robot import joint_indices, motor_torques, without_dry_friction
-
-Array = NDArray[np.float64]
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
 HEIGHT = 0.05  # [m] of the platform's mass centre, so that loads shift

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.arrays import Array
 from caster_gym.envs.observation import ObservationLayout
 
-Array: TypeAlias = NDArray[np.float64]
 Drive: TypeAlias = Callable[[NDArray[np.float32], ObservationLayout, float], Array]
 
 PULL = 4.0  # [1/s] rate at which distances from where a cheat wants to be shrink

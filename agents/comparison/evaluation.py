@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.agents.settings import Paths, TaskSettings
+from caster_gym.arrays import Array
 from caster_gym.envs.caster_follow import CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.caster_vector_env import CasterVectorEnv
@@ -16,7 +17,6 @@ from caster_gym.envs.plan import Plan
 from caster_gym.paths.time_law import row_times
 from caster_gym.wrappers import Feature, FeatureVectorEnv, wrap
 
-Array = NDArray[np.float64]
 Batch: TypeAlias = CasterVectorEnv | FeatureVectorEnv
 
 _BATCHES: dict[str, type[CasterTrackVectorEnv | CasterFollowVectorEnv]] = {

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.agents.comparison.evaluation import Episodes
 from caster_gym.agents.comparison.measuring import Printed, shown
@@ -17,7 +16,6 @@ from caster_gym.render.palette import SERIES as COLOURS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 OBSTACLE = "0.75"
 MOST_PATHS = 6
 MAGNIFIED = 20.0  # how much larger tracking errors are drawn

@@ -5,7 +5,8 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 
 from caster_gym.agents.comparison.evaluation import Episodes
-from caster_gym.agents.comparison.measuring import Array, Counted, Printed, costs, greatest, overall, rms
+from caster_gym.agents.comparison.measuring import Counted, Printed, costs, greatest, overall, rms
+from caster_gym.arrays import Array
 
 SETTLING = 1.0  # [s]
 

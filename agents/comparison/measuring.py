@@ -4,11 +4,10 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.agents.comparison.evaluation import Episodes
+from caster_gym.arrays import Array
 
-Array = NDArray[np.float64]
 SATURATED = 0.999  # commands from here on count as saturated, and torques that differ from theirs by the rest
 
 

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from caster_gym.agents.comparison.measuring import Counted, Printed, shown
 from caster_gym.agents.comparison.metrics import Metrics
+from caster_gym.arrays import Array
 
-Array = NDArray[np.float64]
 RESAMPLES = 2000
 
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.analysis.actuation import warn_if_singular
+from caster_gym.arrays import Array
 from caster_gym.control.torque_distribution import distribute
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 KnownModel = Literal["exact", "without D1", "without wheels"]
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.arrays import Array
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 Held = Callable[[], frozenset[str]]
 SLOWING = 4.0  # [1/s] rate at which the twist approaches the wanted one
 SHARE = 0.4  # of the robot's top speed

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import Robot
 
@@ -23,8 +23,6 @@ _STEPS = 40  # of a descent; near its end each doubles the digits
 _ZERO = 1e-16  # [-] of conditioning², where rounding alone may lead; nothing lies below zero
 _HOPELESS = 1e6  # [-] damping so strong that steps cannot lead down any more
 _DIFFERENCE = 1e-4  # [rad] of differences; conditioning² is smooth at its zeros, where conditioning has a kink
-
-Array = NDArray[np.float64]
 
 
 class ActuationWarning(UserWarning):

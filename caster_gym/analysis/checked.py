@@ -1,9 +1,9 @@
 """Arrays that callers give, checked: the right last axis, and numbers that are finite."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from caster_gym.arrays import Array
 
 
 def finite(name: str, value: ArrayLike, last: int) -> Array:

@@ -4,12 +4,11 @@ A heading is the complex number e^{iβ}, as points of the plane are in `caster_g
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array, Plane
 
 
-def turned(vector: Array, by: complex | NDArray[np.complex128]) -> Array:
+def turned(vector: Array, by: complex | Plane) -> Array:
     """Vectors (..., 3) turned in the plane by unit numbers (...): by a heading from B to W, by its conjugate back."""
     plane = (vector[..., 0] + 1j * vector[..., 1]) * by
     return np.stack((plane.real, plane.imag, np.broadcast_to(vector[..., 2], plane.shape)), axis=-1)

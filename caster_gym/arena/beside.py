@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.arena.arena import Arena, Beside, Pillar, Wall
-from caster_gym.arena.clearance import ROUNDING, Array, separations
+from caster_gym.arena.clearance import ROUNDING, separations
 from caster_gym.arena.packing import hull_from, pack
+from caster_gym.arrays import Array, Plane
 from caster_gym.mechanics.separation import Hull, Obstacles
 
 PRECISION = 1e-4  # [m] of the gaps that are drawn
@@ -19,9 +19,9 @@ class _Track(NamedTuple):
     """A path and the robot that follows it; points and directions are complex numbers x + i y."""
 
     hull: Hull
-    position: NDArray[np.complex128]  # (K,) [m]
-    heading: NDArray[np.complex128]  # (K,)
-    tangent: NDArray[np.complex128]  # (K,)
+    position: Plane  # (K,) [m]
+    heading: Plane  # (K,)
+    tangent: Plane  # (K,)
     way: Array  # (K,) [m] at most, of the robot's points up to each pose
 
 
@@ -141,5 +141,5 @@ def _alone(shape: Pillar | Wall) -> Obstacles:
     return pack([arena])[0]
 
 
-def _poses(position: NDArray[np.complex128], heading: NDArray[np.complex128]) -> Array:
+def _poses(position: Plane, heading: Plane) -> Array:
     return np.stack([position.real, position.imag, heading.real, heading.imag], axis=-1)

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from caster_gym.arena.arena import Arena, HalfPlane
-from caster_gym.arena.clearance import ROUNDING, Array, separations
+from caster_gym.arena.clearance import ROUNDING, separations
 from caster_gym.arena.packing import pack
+from caster_gym.arrays import Array
 from caster_gym.mechanics.separation import Hull
 
 

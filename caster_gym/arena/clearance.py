@@ -1,14 +1,13 @@
 """Gaps between the robot and every obstacle, for whole arrays of poses."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.arena.arena import Arena
 from caster_gym.arena.packing import hull_of, pack
+from caster_gym.arrays import Array
 from caster_gym.mechanics.separation import Hull, Obstacles, separation
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m] of gaps, on any floor
 

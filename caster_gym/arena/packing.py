@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.arena.arena import Arena
 from caster_gym.arena.outlines import Outline, convex
+from caster_gym.arrays import Array, Indices
 from caster_gym.mechanics.impulse import LAWS
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.robot import Robot
@@ -32,7 +32,7 @@ def hull_from(outline: Outline) -> Hull:
     return Hull(_table(outline.faces, 3), corners, outline.radius, reach)
 
 
-def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
+def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, Indices]:
     """All obstacles of some arenas in one table, and the first and the end (arenas, 2) of those of each.
 
     The arenas share restitution, friction and the law of impacts. Obstacles are in the order of `Arena.obstacles`.
@@ -63,11 +63,11 @@ def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, NDArray[np.int64]]:
     return obstacles, _spans([len(those) for those in outlines])
 
 
-def _spans(counts: Sequence[int]) -> NDArray[np.int64]:
+def _spans(counts: Sequence[int]) -> Indices:
     """First and end (K, 2) of consecutive parts of these lengths."""
     ends = np.cumsum(np.array(counts, dtype=np.int64))
     return np.stack([ends - np.array(counts, dtype=np.int64), ends], axis=1)
 
 
-def _table(rows: Sequence[Sequence[float]], columns: int) -> NDArray[np.float64]:
+def _table(rows: Sequence[Sequence[float]], columns: int) -> Array:
     return np.array(rows, dtype=np.float64).reshape(-1, columns)

@@ -9,16 +9,13 @@ An active-set method finds which motors are at theirs: it is exact, and every su
 gets the same torques alone and in a batch, to the last bit.
 """
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags
 from caster_gym.mechanics.linear import dot, extreme_eigenvalues, solve
 from caster_gym.mechanics.scalars import Symmetric
-
-Array: TypeAlias = NDArray[np.float64]
-Flags: TypeAlias = NDArray[np.bool_]
 
 WELL_CONDITIONED = 0.05  # σ_min / σ_max of B below which damping sets in
 STRONGEST_DAMPING = 0.02  # of σ_max, at a singular configuration

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from caster_gym.control.torque_distribution import Array, Flags, distribute
+from caster_gym.arrays import Array, Flags
+from caster_gym.control.torque_distribution import distribute
 
 _FLAT = 1e-6  # [-] sine of the angle between two columns that make no face
 _SLACK = 1e-9  # [-] of the greatest column, for rounding

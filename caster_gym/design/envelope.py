@@ -20,9 +20,9 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.analysis.frames import rate_in_body
+from caster_gym.arrays import Array
 from caster_gym.design.target import Target
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
@@ -36,8 +36,6 @@ from caster_gym.paths.moments import Motion, hard_spans, moments_within, motion_
 from caster_gym.paths.moments import joined as joined_spans
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Motor, Robot
-
-Array = NDArray[np.float64]
 
 SAMPLES = 1024  # motions of each stage; a power of two, as Sobol's sequence likes it
 REST, FLIP, FULL, TOP = range(4)

@@ -10,16 +10,15 @@ something: 1 moves equally well in every direction, 0 cannot move in one (or can
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.analysis.checked import finite
+from caster_gym.arrays import Array
 from caster_gym.design.isotropy_grid import mean_isotropy
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import Robot, check_joints
-
-Array = NDArray[np.float64]
 
 INTERVAL = float(np.radians(5.0))  # [rad] between the steering angles of kim2001's grid
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.native.compilation import Work
 from caster_gym.engines.native.compiler import INLINE, compiled
 from caster_gym.engines.native.threads import over_blocks
@@ -19,8 +19,6 @@ from caster_gym.mechanics.caster import rate_rows
 from caster_gym.mechanics.linear import extreme_eigenvalues
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import maximum, sqrt
-
-Array = NDArray[np.float64]
 
 SAME = 1e-9  # relative; quotients and places that differ by less are the same up to rounding
 BATCH = 256  # designs whose tables are in memory at once

@@ -15,13 +15,12 @@ from itertools import combinations, permutations
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import kind_and_caster, named_joints, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 Class: TypeAlias = Literal["never", "somewhere", "always"]
 
 TOUCH = 1e-9  # [-] of the robot's greatest length: circles nearer to each other than this touch

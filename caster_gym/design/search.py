@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, PositiveFloat
 
 from caster_gym.analysis.actuation import SINGULAR, worst_conditioning
+from caster_gym.arrays import Array
 from caster_gym.design.envelope import (
     Motions,
     driven_motors,
@@ -31,7 +31,6 @@ from caster_gym.design.target import Target, check_actuation, check_conditioning
 from caster_gym.paths.trajectory import Trajectory, rounded_down
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 Objective: TypeAlias = Literal["isotropy", "torque", "use"]
 
 GRID = {"isotropy": 33, "torque": 17, "use": 17}  # designs along each side of the grid that the search starts from

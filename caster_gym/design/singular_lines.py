@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.analysis.checked import finite
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import wheel_centre
 from caster_gym.mechanics.parameters import CasterParameters, robot_parameters
 from caster_gym.robot import Robot, check_joints
-
-Array = NDArray[np.float64]
 
 MEETS = 1e-9  # [-] gap up to which lines meet, share of L beyond 1/MEETS of which they are parallel: far above rounding
 _UNIT = 1e-6  # [-] by which the directions of given lines may miss unit length

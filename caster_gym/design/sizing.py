@@ -7,8 +7,8 @@ margin k it must lie on or above its line as if every torque and every speed wer
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.design.envelope import (
     Loads,
     Motions,
@@ -25,8 +25,6 @@ from caster_gym.design.envelope import (
 from caster_gym.design.target import Target, check_actuation, check_conditioning, driven_as, loaded
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _STARTS, _ROUNDS, _TRIES = 4, 24, 24  # of the search for harder motions around the hardest of so many parts
 _FIRST_STEP, _SHRINKING = 0.3, 0.8  # [-] its step in shares, paces and, times π, directions; and its ratio

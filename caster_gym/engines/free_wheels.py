@@ -5,14 +5,12 @@ their torque is that of the speed at a step's start, and full torque must not th
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.time_scales import STEPS_TO_TOP
 from caster_gym.engines.time_step import MOST_SUBSTEPS, follows, rounded_down, substeps_for
 from caster_gym.mechanics.caster_masses import held_inertia
 from caster_gym.mechanics.parameters import CasterParameters, unpack_parameters
-
-Array = NDArray[np.float64]
 
 
 def check_free_wheels(what: str, rows: Array, time_step: float, substeps: int) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.floor import Floor, FloorLike, load_floor
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
@@ -22,7 +23,6 @@ from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.mechanics.slip import rolling_state
 from caster_gym.robot import Robot, check_joints
 
-Array = NDArray[np.float64]
 ROUGHEST = 1e6  # [-] between hull and obstacles: a contact sticks long before
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.mechanics import stability
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.dynamics import caster_inertia, forward_dynamics, platform_inertia
@@ -20,7 +20,6 @@ from caster_gym.mechanics.parameters import (
 )
 from caster_gym.mechanics.scalars import Direction, Symmetric, each
 
-Array: TypeAlias = NDArray[np.float64]
 Share: TypeAlias = Callable[[Direction, CasterParameters], Symmetric]
 
 _REAL, _COMPLEX = 2.785, 2.61  # least |h λ| at which RK4 is unstable, for λ on the negative real axis and beside it

@@ -3,16 +3,13 @@
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.time_scales import STEPS_TO_TOP, Limits, greatest_part, limits
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters, unpack_parameters
 from caster_gym.robot import Robot
-
-Array: TypeAlias = NDArray[np.float64]
 
 MOST_SUBSTEPS = 1000  # of a control period
 SHORTEST_PERIOD = 1e-5  # [s]

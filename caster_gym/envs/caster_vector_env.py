@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Flags
 from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.inputs import Seeds, checked_mask, checked_seeds, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
@@ -21,7 +22,6 @@ from caster_gym.envs.starts import read_options, read_start, restart_at
 from caster_gym.envs.task import Task
 
 Observations = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 
 
 class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):

@@ -1,18 +1,15 @@
 """Lets environments draw themselves, as Gymnasium asks; what is drawn, and how, is said in `caster_gym.render`."""
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from gymnasium import logger
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Frame
 from caster_gym.envs.native.engine import TaskEngine
 
 if TYPE_CHECKING:
     from caster_gym.render.album import Album
     from caster_gym.render.viewer import Viewer
-
-Frame: TypeAlias = NDArray[np.uint8]
 
 
 def checked_mode(render_mode: str | None, metadata: dict[str, Any]) -> str | None:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.envs.native.layout import (
     ENDINGS,
@@ -24,8 +24,6 @@ from caster_gym.mechanics.scalars import each, pairs
 from caster_gym.mechanics.separation import Obstacles
 from caster_gym.mechanics.slip import slip_step, unpack_slip_state
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

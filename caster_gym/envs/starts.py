@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.arena.clearance import ROUNDING
+from caster_gym.arrays import Array
 from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.inputs import checked_numbers, checked_options
@@ -24,8 +25,6 @@ from caster_gym.mechanics.parameters import unpack_parameters
 from caster_gym.mechanics.slip import rolling_state
 from caster_gym.paths.trajectory import rounded_down
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _SHIFT = np.uint64(11)
 _BY_ROUNDING = 1.0 + 1e-9  # of speeds and lengths that stand exactly at their limit

@@ -3,13 +3,11 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.recording import Recording
 from caster_gym.identification.unknowns import ACTING, SHOWN, kind_of, of_caster
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def acting_torque(recording: Recording, robot: Robot, values: Mapping[str, float], substeps: int) -> Array:

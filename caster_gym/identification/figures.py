@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.fit import Identification
 from caster_gym.identification.recording import KIND_UNITS
 from caster_gym.report.drawing import COLOURS, new_figure
@@ -13,7 +14,6 @@ from caster_gym.report.drawing import COLOURS, new_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 _NAMES = {
     "position": "x",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.friction_allowance import Allowance, allow_for_friction
 from caster_gym.identification.friction_shape import JOINTS, Shapes
 from caster_gym.identification.mends import listed
@@ -33,8 +34,6 @@ from caster_gym.identification.unknowns import (
 from caster_gym.identification.window_fit import Fit, fit
 from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _CLOSE = 100.0  # squared distance to the optimum, in standard deviations, from which the last part of a fit goes on
 _SHORT = 0.25  # [-] of a window, for a first fit that far starting values do not lead astray

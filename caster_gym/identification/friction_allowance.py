@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.friction_shape import Believed, Shapes, likeliest_deviations
 from caster_gym.identification.recording import FINER
 from caster_gym.identification.shooting import Shooting
 from caster_gym.identification.window_fit import Fit, NoiseUpdate, Normal, Point, Told, normal, point_at
-
-Array = NDArray[np.float64]
 
 _MOST_LOOKS = 8
 _NEAR = 4.0  # squared distance to the optimum, in standard deviations, over which a fit is linear: one step ends it

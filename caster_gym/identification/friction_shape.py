@@ -20,12 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.identification.shooting import Shooting
 from caster_gym.identification.window_fit import Point
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 JOINTS = ("rolling", "steering")
 _SHARPEST = 0.1  # [-] of `coulomb_speed`: what is sharper than this cannot be told from it

@@ -16,12 +16,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.recording import Recording
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _TURNED = 0.3  # [rad] that wheels turn within a window, about
 _SHORTEST, _FEWEST = 4, 8  # samples in a window, and windows

@@ -4,15 +4,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.contradictions import Finding, columns_of
 from caster_gym.identification.kinematic_laws import white_noise
 from caster_gym.identification.mends import Mend, listed
 from caster_gym.identification.recording import Recording
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _FEWEST_CHANGES = 5
 _HELD = 0.8  # [-] of a column's changes that come at one and the same interval

@@ -7,12 +7,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.recording import Recording
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _DEGREE = math.pi / 180.0
 _LONGEST_SHIFT = 10  # samples

@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.friction_allowance import Allowance
 from caster_gym.identification.recording import KIND_UNITS, Noise, Recording
 from caster_gym.identification.shooting import Shooting
 from caster_gym.identification.window_fit import Normal, Told, point_at
-
-Array = NDArray[np.float64]
 
 LEAST_NOISE = 1e-9  # [m, rad, …] standard deviation below which rounding and time steps decide
 _EXACT = 1e-5  # [-] of a quantity's own variation: errors so small are those of time steps, not of a sensor

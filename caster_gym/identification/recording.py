@@ -21,10 +21,11 @@ from pathlib import Path
 import numpy as np
 from pydantic import NonNegativeFloat
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import Frozen
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.time_step import longest_time_step, substeps_for
-from caster_gym.identification.recording_table import FEWEST_ROWS, POSE, TWIST, Array, read_measured
+from caster_gym.identification.recording_table import FEWEST_ROWS, POSE, TWIST, read_measured
 from caster_gym.identification.rolling import rolled_along
 from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.robot import Robot

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.identification.acting import shown_errors
 from caster_gym.identification.contradictions import SURE, Finding, hopeless_words, mend_words, size_words, small_words
@@ -20,8 +19,6 @@ from caster_gym.identification.mends import Mend, mends, scaled_up, turned
 from caster_gym.identification.recording import Recording
 from caster_gym.identification.unknowns import robot_with
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _MOST_ROWS = 2000  # in which mistakes are looked for, the liveliest of the recording
 _FACTOR = 3.2  # by which a mend must lessen what is left of all laws together

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import did_you_mean
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import robot_parameters
@@ -16,8 +16,6 @@ from caster_gym.robot import Robot
 from caster_gym.table_files import read_table
 from caster_gym.tables import Quantity, Table, note, note_left_out
 from caster_gym.units import unlikely_radians
-
-Array = NDArray[np.float64]
 
 FEWEST_ROWS = 10
 POSE = ("x", "y", "heading")

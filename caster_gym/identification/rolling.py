@@ -1,11 +1,9 @@
 """How far wheels roll along a path that the simulator has gone: the time integral of (K2)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-
-Array = NDArray[np.float64]
 
 _ASIDE = 1e-6  # [s] by which rates are looked at before and after, for their slopes
 

@@ -17,8 +17,8 @@ from typing import Any, cast
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.identification.acting import acting_torque, acts, shown_errors
@@ -27,8 +27,6 @@ from caster_gym.identification.rolling import rolled_along
 from caster_gym.identification.unknowns import PARAMETERS, kind_of, parameters_with
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _SMOOTHING = 7  # samples over which velocities are first guessed from poses
 _ASIDE = 1e-6  # [-] of a value, or in its unit, by which it is changed for a difference

@@ -12,9 +12,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.identification.shooting import Shooting
-
-Array = NDArray[np.float64]
 
 MOST_STEPS = 30
 _LEAST_RANK = 1e-12  # [-] of the greatest eigenvalue of H, below which rounding decides

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import AfterValidator
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import ConfigurationError
-from caster_gym.paths.trajectory import Array
 from caster_gym.units import UNITS, unlikely_angle, unlikely_radians
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]

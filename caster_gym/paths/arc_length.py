@@ -9,7 +9,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from caster_gym.paths.trajectory import Array, Plane, Trajectory, rounded_down
+from caster_gym.arrays import Array, Plane
+from caster_gym.paths.trajectory import Trajectory, rounded_down
 
 Values = TypeVar("Values", Array, Plane)
 

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from caster_gym.arrays import Array, Plane
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.arc_length import LINE_COLUMNS, CoarseSpacingError, Line, NoLineError, between, line_along
 from caster_gym.paths.specification import AnyPath, PathLike, named_apart, read_paths
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.time_law import fastest_laws, row_times
 from caster_gym.paths.timed import Timed
-from caster_gym.paths.trajectory import MOST_STEPS, Array, Plane, Trajectory, check_time_step, tabulate
+from caster_gym.paths.trajectory import MOST_STEPS, Trajectory, check_time_step, tabulate
 from caster_gym.robot import Robot
 
 COURSE_COLUMNS = (*LINE_COLUMNS, "square_speed")

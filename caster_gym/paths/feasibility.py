@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Indices
 from caster_gym.mechanics.actuation import caster_gram, characteristic_length, motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import inverse_dynamics
@@ -31,7 +31,7 @@ from caster_gym.paths.moments import (
     motion_at,
     sampled,
 )
-from caster_gym.paths.trajectory import COLUMNS, LEAST_STEPS, Array, Trajectory
+from caster_gym.paths.trajectory import COLUMNS, LEAST_STEPS, Trajectory
 from caster_gym.robot import Robot
 
 DAMPING = 1e-6  # [-] of the mean square push of the motors: bounds torques where the driven motors lose a direction
@@ -50,7 +50,7 @@ class MotorUse:
     """The hardest moment of each of P trajectories; joint 2 N stands for force that the driven motors cannot give."""
 
     use: Array  # (P,) 1 is the limit
-    joint: NDArray[np.int64]  # (P,) index into the robot's joints of the motor that is coupled first to that joint
+    joint: Indices  # (P,) index into the robot's joints of the motor that is coupled first to that joint
     time: Array  # (P,) [s]
     torque: Array  # (P,) [N m] asked of that motor; the force missing [N] for joint 2 N
     left: Array  # (P,) [N m] torque that it has at its speed
@@ -126,7 +126,7 @@ class _Hardest:
         self._keep(here, use[i], joint[i], moments.time[i])
         self._rows[here], self._psi[here] = moments.rows[i], moments.psi[i]
 
-    def _keep(self, path: NDArray[np.int64], use: Array, joint: NDArray[np.int64], time: Array) -> None:
+    def _keep(self, path: Indices, use: Array, joint: Indices, time: Array) -> None:
         self.use[path], self._joint[path], self._time[path] = use, joint, time
 
     def told(self, robot: RobotParameters) -> MotorUse:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths.angles import AngleUnit, ZeroAxis, degrees_by_mistake, unwrapped
 from caster_gym.paths.planner_files import PLANNER_SUFFIXES, read_planner_file
-from caster_gym.paths.trajectory import Array
 from caster_gym.table_files import TABLE_SUFFIXES, read_table
 from caster_gym.tables import Quantity, Table, note, note_left_out
 from caster_gym.units import unlikely_radians

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
 
+from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import ConfigurationError, Frozen
 from caster_gym.paths.angles import AngleUnit, plain, read_angle, read_angles
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
-from caster_gym.paths.trajectory import Array, Plane
 
 _EIGHTH = 45.0  # [deg] numbers of revolutions that are twice that or more, and multiples of it, are degrees
 

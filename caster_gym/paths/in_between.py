@@ -10,7 +10,7 @@ parabola: it would swing beyond them by half of the jump. There accelerations go
 
 import numpy as np
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array
 
 _BENT = 1.5 / 8.0  # [-] a parabola leaves the line by 1/8 of the second difference; half as much more if that changes
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array
 
 _NATURAL = [(3, 0.0), (4, 0.0)]  # the ends that leave the least ∫ |p‴|²
 

@@ -14,19 +14,16 @@ from itertools import groupby
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags, Indices, Plane
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import joint_friction
 from caster_gym.mechanics.parameters import CasterParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten
 from caster_gym.paths.in_between import in_between, room_for
 from caster_gym.paths.trailing import trailing_directions, trailing_on
-from caster_gym.paths.trajectory import Array, Plane, Trajectory
+from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
-
-Indices: TypeAlias = NDArray[np.int64]
-Flags: TypeAlias = NDArray[np.bool_]
 
 FRICTION_TURN = 2e-3  # [-] of a motor's torque: a joint's dry friction that changes by more is changing its sign
 _BLOCK = 16_384  # samples that are worked on at once

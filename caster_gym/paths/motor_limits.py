@@ -12,11 +12,11 @@ sign ask for more in between. `excess` therefore looks at points that lie close 
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags, Indices, Plane
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import bias, caster_drive, inertia, inverse_dynamics, resistance
@@ -28,10 +28,7 @@ from caster_gym.paths.arc_length import Line, between
 from caster_gym.paths.feasibility import least_effort
 from caster_gym.paths.moments import FRICTION_TURN, dry_friction, greatest_torques
 from caster_gym.paths.trailing import directions_at_rows
-from caster_gym.paths.trajectory import Array, Plane
 from caster_gym.robot import Robot
-
-Flags: TypeAlias = NDArray[np.bool_]
 
 PARTS = 4  # of an interval, at whose ends half-planes stand
 _STEP = 1.0 / 24.0  # [-] of the shortest trail between the points of `excess`: a flip errs by 0.1 % of a torque then
@@ -68,7 +65,7 @@ class Ways(NamedTuple):
     points: Array  # (9, steps + 1, K, P) with the columns of lines
     psi: Plane  # (N, steps + 1, K, P) rolling directions in W
 
-    def of(self, lines: NDArray[np.int64]) -> "Ways":
+    def of(self, lines: Indices) -> "Ways":
         """Those of some lines."""
         return Ways(self.points[..., lines], self.psi[..., lines])
 
@@ -227,7 +224,7 @@ def _in_a_row(values: Any, stride: int) -> Any:
 
 def _friction_between(
     v: Vector, directions: tuple[Direction, ...], robot: RobotParameters
-) -> tuple[tuple[NDArray[np.int64], ...], list[Array]]:
+) -> tuple[tuple[Indices, ...], list[Array]]:
     """Places in (S, M) where dry friction changes fast, and what its worst adds to each limit of the motors there.
 
     Joints may change one after the other: each counts with the worst of its friction at the point and its neighbours.

@@ -10,18 +10,10 @@ from typing import Annotated, Literal, Self, get_args
 import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
+from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import Rotation
-from caster_gym.paths.trajectory import (
-    Array,
-    Plane,
-    Trajectory,
-    place,
-    rest_to_rest,
-    rounded_down,
-    tabulate,
-    whole_steps,
-)
+from caster_gym.paths.trajectory import Trajectory, place, rest_to_rest, rounded_down, tabulate, whole_steps
 
 RandomHeading = Literal["tangent", "fixed", "spinning", "profile"]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array
 
 _FEWEST = 30  # fewer waypoints do not show that they were rounded: people type round numbers
 _FINE = 0.01  # [-] of the extent: a coarser grid is not taken for rounding, unless neighbours fall together on it

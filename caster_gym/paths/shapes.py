@@ -7,12 +7,11 @@ from typing import ClassVar, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt, model_validator
 
+from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import Rotation
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.trajectory import (
-    Array,
-    Plane,
     Trajectory,
     place,
     rest_to_rest_at,

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.sparse.linalg import splu
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array
 
 _DEGREE = 5
 _ORDER = 4  # of the derivative that the penalty is on

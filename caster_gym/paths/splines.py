@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
 
+from caster_gym.arrays import Array
 from caster_gym.paths.angles import AngleUnit, ZeroAxis, plain, read_angles
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.shapes import SIZES, Shape
-from caster_gym.paths.trajectory import LEAST_STEPS, Array, Trajectory, rounded_down, whole_steps
+from caster_gym.paths.trajectory import LEAST_STEPS, Trajectory, rounded_down, whole_steps
 from caster_gym.paths.walks import MOST_ROUNDED, Walk
 from caster_gym.paths.waypoints import SAME_PLACE, Track, Turns, read_track
 

@@ -14,11 +14,10 @@ from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Indices
 from caster_gym.paths.arc_length import Line
 from caster_gym.paths.motor_limits import LEAST_LEFT, PARTS, Limits, excess, limits_along, steps_between, ways_along
-from caster_gym.paths.trajectory import Array
 from caster_gym.robot import Robot
 
 _PASSES = 2  # each takes the tangents of c √x at the law before; a third would save 0.1 % of the time
@@ -96,7 +95,7 @@ def _block(lines: Sequence[Line], steps: int, robot: Robot, speed_limit: float, 
     )
 
 
-def _laws(limits: Limits, spacing: Array, ends: NDArray[np.int64]) -> Array:
+def _laws(limits: Limits, spacing: Array, ends: Indices) -> Array:
     """ṡ² (K + 1, P) of lines that end at the rows `ends`."""
     rows = limits.top[::PARTS]
     cap = np.where((np.arange(len(rows))[:, None] >= ends) | (np.arange(len(rows)) == 0)[:, None], 0.0, rows**2)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import Frozen
 from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain, read_angles, unwrapped
 from caster_gym.paths.in_between import in_between, room_for
@@ -14,7 +15,6 @@ from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import (
     LEAST_STEPS,
     MOST_STEPS,
-    Array,
     Trajectory,
     check_time_step,
     place,

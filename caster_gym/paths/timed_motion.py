@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import solveh_banded
 from scipy.sparse import csr_array, diags_array
 
-from caster_gym.paths.trajectory import Array
+from caster_gym.arrays import Array
 
 DENSE = 20  # samples, from which on a table is a record of a motion rather than a list of places
 _MEDIAN = 0.6745  # [-] half of normal errors are below that share of σ

@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from caster_gym.paths.trajectory import Array, Plane
+from caster_gym.arrays import Array, Plane
 from caster_gym.robot import Robot
 
 Pair: TypeAlias = tuple[Array, Array]

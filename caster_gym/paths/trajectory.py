@@ -6,10 +6,8 @@ Points and vectors of the plane are complex numbers x + i y throughout this pack
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Plane = NDArray[np.complex128]
+from caster_gym.arrays import Array, Plane
 
 COLUMNS = ("x", "y", "cos", "sin", "vx", "vy", "omega", "ax", "ay", "alpha")
 MOST_TURN = 1.0  # [rad] of the heading in one time step

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from caster_gym.arrays import Array
 from caster_gym.paths.headings import Slopes
-from caster_gym.paths.trajectory import Array
 from caster_gym.paths.waypoints import Leg
 
 _MEANS_ERR = 1.3  # [-] mean square error of a mean of n neighbours, as a multiple of 1 / n; found by trial

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags, Indices
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, is_coarse, rounding, zigzag
-from caster_gym.paths.trajectory import Array
 
 Turns = Literal["auto", "nearest", "as_written"]
 
@@ -141,7 +140,7 @@ def _is_jitter(rows: Array, spacing: float) -> bool:
     return bool(_jittering(ring, spacing)[1])
 
 
-def _jittering(points: Array, spacing: float) -> NDArray[np.bool_]:
+def _jittering(points: Array, spacing: float) -> Flags:
     """Which steps (n - 1,) between points only repeat a point, but for its rounding."""
     steps = np.diff(points[:, 0] + 1j * points[:, 1])
     lengths = np.abs(steps)
@@ -155,7 +154,7 @@ def _jittering(points: Array, spacing: float) -> NDArray[np.bool_]:
     return small
 
 
-def _places(rows: Array, tolerance: float) -> NDArray[np.int64]:
+def _places(rows: Array, tolerance: float) -> Indices:
     """First row of each place, for rows (n, 2 or 3) of which neighbours may be the same place."""
     points = rows[:, 0] + 1j * rows[:, 1]
     if tolerance > 0.0:

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+from caster_gym.arrays import Frame
 from caster_gym.envs.scene import Scene
-from caster_gym.render.viewer import SIZE, Frame, Viewer
+from caster_gym.render.viewer import SIZE, Viewer
 
 
 class Album:

@@ -9,13 +9,13 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.render.palette import PAPER, Colour
 from caster_gym.render.pygame_loader import pygame
 from caster_gym.render.view import Area
 
-Array = NDArray[np.float64]
 SAMPLES = 4  # along each axis of a finished pixel; a power of two, for which pygame averages without error
 PIECE = 2.0  # [px] of a line through dense points; its arc is 0.03 px from its chord at a radius of 20 px
 SHARP = 0.2  # [rad] turn of a line above which its corner is rounded off

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
 from caster_gym.render import palette
 from caster_gym.render.canvas import Canvas, rounded_rectangle
@@ -12,7 +12,6 @@ from caster_gym.render.history import IMPACT_LIFE, History, Impact
 from caster_gym.render.view import View, reach
 from caster_gym.robot import Caster, Footprint, Robot
 
-Array = NDArray[np.float64]
 WHEEL_WIDTH = 0.62  # of its radius; the robot file knows none
 SHOWN_ACCELERATION = 2.0  # [m/s²] the forces that give it to the robot are drawn as long as the robot reaches
 LONGEST_ARROW = 1.6  # of the robot's reach

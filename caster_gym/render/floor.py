@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
 from caster_gym.mechanics.separation import Obstacles
 from caster_gym.render import palette
 from caster_gym.render.canvas import Canvas, thinned
 from caster_gym.render.view import Area, View, round_length
 
-Array = NDArray[np.float64]
 BACKING = 0.75  # opacity of the paper behind letters
 LEGEND = 136.0  # [px] its width, at unit size
 THIN = 2.0  # [px] a wall without thickness, at unit size

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
 
-Array = NDArray[np.float64]
 IMPACT_LIFE = 0.6  # [s] for which an impact is shown
 
 

@@ -11,9 +11,9 @@ from typing import Protocol
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
-from numpy.typing import NDArray
 
-Frame = NDArray[np.uint8]
+from caster_gym.arrays import Frame
+
 SUFFIXES = (".mp4", ".gif")
 MOST_COLOURS = 160  # of a GIF, for the whole film
 PALETTE_FRAMES = 8  # evenly spread over the film, from which they are taken

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 NEAR = 0.25  # of what is shown anyway: half-planes not farther off than that are shown too
 BEHIND = 0.04  # how much of them is
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Frame
 from caster_gym.envs.scene import Scene
 from caster_gym.render import palette
 from caster_gym.render.canvas import Canvas
@@ -20,7 +20,6 @@ from caster_gym.render.panel import draw_panel, status
 from caster_gym.render.pygame_loader import pygame
 from caster_gym.render.view import Area, View, around, extent, fitted, grid
 
-Frame = NDArray[np.uint8]
 SIZE = (960, 640)  # [px]
 UNIT = 640.0  # [px] frame height for which letters and lines are designed
 MOST = 16  # robots shown at once

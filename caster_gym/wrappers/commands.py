@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from pydantic import Field, PositiveFloat, field_validator
 
-from caster_gym.wrappers.feature import Actions, Array, Feature, Observations, Place, Robots, Runtime
+from caster_gym.arrays import Array
+from caster_gym.wrappers.feature import Actions, Feature, Observations, Place, Robots, Runtime
 from caster_gym.wrappers.inner_loop import InnerLoop
 from caster_gym.wrappers.twist_loop import TwistLoop
 

@@ -9,9 +9,9 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Indices
 from caster_gym.envs.randomness import bits, episode_seed
 
-Array = NDArray[np.float64]
 Seeds = NDArray[np.uint64]
 
 _SHIFT_11, _SHIFT_12 = np.uint64(11), np.uint64(12)
@@ -28,13 +28,13 @@ def seeds_of(keys: Seeds, episodes: Seeds, of: np.uint64) -> Seeds:
     return seeds
 
 
-def uniforms(seeds: Seeds, indices: NDArray[np.int64]) -> Array:
+def uniforms(seeds: Seeds, indices: Indices) -> Array:
     """Numbers (robots, k) in [0, 1) for seeds (robots,) and indices (k,) or (robots, k)."""
     drawn: Seeds = bits(seeds[:, None], indices.astype(np.uint64)) >> _SHIFT_11
     return drawn.astype(np.float64) * 2.0**-53
 
 
-def normals(seeds: Seeds, indices: NDArray[np.int64]) -> Array:
+def normals(seeds: Seeds, indices: Indices) -> Array:
     """Standard normal numbers (robots, k), by the inverse of their distribution."""
     from scipy.special import ndtri  # late: most environments make no noise
 

@@ -12,9 +12,10 @@ from gymnasium.vector.utils import batch_space
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags
 from caster_gym.envs.inputs import read_actions
 from caster_gym.envs.specification import plain
-from caster_gym.wrappers.feature import Actions, Array, Feature, Flags, Observations
+from caster_gym.wrappers.feature import Actions, Feature, Observations
 from caster_gym.wrappers.plants import WheelErrors
 from caster_gym.wrappers.specification import read_features
 from caster_gym.wrappers.stack import Stack

@@ -13,6 +13,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pydantic import AfterValidator
 
+from caster_gym.arrays import Array, Flags, Indices
 from caster_gym.configuration import Frozen
 
 if TYPE_CHECKING:
@@ -20,12 +21,10 @@ if TYPE_CHECKING:
     from caster_gym.envs.observation import Part
     from caster_gym.envs.task import Task
 
-Array: TypeAlias = NDArray[np.float64]
 Actions: TypeAlias = NDArray[np.float32]
 Observations: TypeAlias = NDArray[np.float32]
-Flags: TypeAlias = NDArray[np.bool_]
 Seeds: TypeAlias = NDArray[np.uint64]
-Robots: TypeAlias = NDArray[np.int64] | slice
+Robots: TypeAlias = Indices | slice
 Quantities: TypeAlias = Callable[[str], Array]  # a quantity (robots, …) of the environment's info, by its name
 
 
@@ -68,7 +67,7 @@ class Place:
     task: "Task"
     width: int  # of the actions that the feature inside understands
     seeds: Seeds  # (robots,) of the feature's random numbers in the present episodes; the stack keeps them up to date
-    clocks: NDArray[np.int64]  # (robots,) control periods done in them, likewise
+    clocks: Indices  # (robots,) control periods done in them, likewise
 
     @property
     def count(self) -> int:
@@ -91,7 +90,7 @@ class Runtime:
     action_space: "Box[Any] | None" = None
     """Space of one robot's action, if it means something else than inside."""
 
-    def begin(self, robots: NDArray[np.int64], quantities: Quantities) -> None:
+    def begin(self, robots: Indices, quantities: Quantities) -> None:
         """New episodes of some robots have begun; quantities are those after their reset."""
 
     def act(self, actions: Actions) -> Actions:

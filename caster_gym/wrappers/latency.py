@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from caster_gym.arrays import Array
 from caster_gym.wrappers.draws import uniforms
-from caster_gym.wrappers.feature import Actions, Array, Feature, Place, Quantities, Runtime, Size, between
+from caster_gym.wrappers.feature import Actions, Feature, Place, Quantities, Runtime, Size, between
 
 FIRST = np.zeros(1, dtype=np.int64)
 Periods = Annotated[int, Field(ge=0, le=1000)]

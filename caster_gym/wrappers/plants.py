@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, NonNegativeFloat
 
+from caster_gym.arrays import Array, Indices
 from caster_gym.floor import GREATEST
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
@@ -21,7 +21,6 @@ from caster_gym.mechanics.parameters import (
 )
 from caster_gym.wrappers.draws import uniforms
 from caster_gym.wrappers.feature import (
-    Array,
     Feature,
     Observations,
     Place,
@@ -183,7 +182,7 @@ class _WheelErrors(PlantRuntime):
         rebuilt[:, self._columns] += np.tile(ends, (len(parameters), len(self._columns) // 2))
         return rebuilt
 
-    def begin(self, robots: NDArray[np.int64], quantities: Quantities) -> None:
+    def begin(self, robots: Indices, quantities: Quantities) -> None:
         self._ratios[robots] = self._described / (self._described + self._errors(self._place.seeds[robots]))
 
     def observe(self, observations: Observations, robots: Robots) -> Observations:

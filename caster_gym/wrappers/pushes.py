@@ -5,8 +5,9 @@ from typing import Literal
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from caster_gym.arrays import Array
 from caster_gym.wrappers.draws import uniforms
-from caster_gym.wrappers.feature import Array, Feature, Place, PushingRuntime, Quantities, Range, Runtime, Size, between
+from caster_gym.wrappers.feature import Feature, Place, PushingRuntime, Quantities, Range, Runtime, Size, between
 
 _DRAWS = 4  # a control period: whether, how hard, whither, how twisting
 

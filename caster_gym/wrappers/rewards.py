@@ -6,8 +6,9 @@ from typing import Annotated, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from caster_gym.arrays import Array, Flags
 from caster_gym.configuration import ConfigurationError
-from caster_gym.wrappers.feature import Array, Feature, Flags, Place, Quantities, RewardRuntime, Runtime
+from caster_gym.wrappers.feature import Feature, Place, Quantities, RewardRuntime, Runtime
 
 Shape: TypeAlias = Literal["gaussian", "long_tail", "linear", "quadratic"]
 

@@ -5,16 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array, Flags, Indices
 from caster_gym.configuration import ConfigurationError, did_you_mean
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.wrappers.draws import seeds_of, stream
 from caster_gym.wrappers.feature import (
     Actions,
-    Array,
     Feature,
-    Flags,
     Observations,
     Place,
     PlantRuntime,
@@ -81,7 +79,7 @@ class Stack:
         what = f"robots like {self._engine.robot.name!r} as the environment's features may make them"
         self._engine.check_parameters(np.concatenate([extremes, drawn]), what)
 
-    def _on_restart(self, robots: NDArray[np.int64]) -> None:
+    def _on_restart(self, robots: Indices) -> None:
         keys, episodes = self._engine.episodes(robots)
         for i, of in enumerate(self._streams):
             self._coming[i, robots] = seeds_of(keys, episodes, of)
@@ -93,7 +91,7 @@ class Stack:
                 robots, rows, checked=True
             )  # at the start; here it would take longer than steps
 
-    def begin(self, robots: NDArray[np.int64], observations: Observations, infos: Mapping[str, Any]) -> Observations:
+    def begin(self, robots: Indices, observations: Observations, infos: Mapping[str, Any]) -> Observations:
         """What some robots show after their reset; observations are theirs, infos those of all robots."""
         for seeds, coming in zip(self._seeds, self._coming, strict=True):
             seeds[robots] = coming[robots]

@@ -17,11 +17,12 @@ from typing import Protocol
 import numpy as np
 from gymnasium.spaces import Box
 
+from caster_gym.arrays import Array
 from caster_gym.control.torque_distribution import distribute
 from caster_gym.control.wrench_limits import reach_of
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.paths.trailing import steered
-from caster_gym.wrappers.feature import Actions, Array, Place, Quantities
+from caster_gym.wrappers.feature import Actions, Place, Quantities
 from caster_gym.wrappers.inner_loop import InnerLoop
 
 _HALVINGS = 12  # of the interval in which the multiple of a command lies that the motors can hold: 0.02 %

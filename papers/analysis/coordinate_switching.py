@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.analysis.checked import finite
 from caster_gym.analysis.frames import turned
+from caster_gym.arrays import Array
 from caster_gym.engines.time_step import check_time_step
 from caster_gym.robot import Robot
 from papers.analysis.orthogonal_complement import INDEPENDENT, OrthogonalComplement
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.analysis.checked import finite
 from caster_gym.analysis.frames import motion_in_body, turned
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 _STILL = 1e-12  # [m/s, rad/s] slower twists do not tell where a robot starts to
 

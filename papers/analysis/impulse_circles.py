@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import Robot, check_joints
-from papers.analysis.impulse_shape import CENTRE, Array, ComplexArray, elongation
+from papers.analysis.impulse_shape import CENTRE, ComplexArray, elongation
 
 STRIDE = 0.05  # [rad] between neighbouring points of a traced curve
 SLICES, CELLS = 12, 64  # planes in which circles are looked for, and cells along each side of them

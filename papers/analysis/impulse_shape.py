@@ -19,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.dynamics import caster_inertia
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import each
 from caster_gym.robot import Robot
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 CENTRE = (0.0, 0.0)  # C, in B

@@ -14,15 +14,14 @@ function raises ValueError if it has another last axis or is not finite.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.analysis.checked import finite
+from caster_gym.arrays import Array
 from caster_gym.mechanics.caster import rate_rows, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import Direction, each
 from caster_gym.robot import Robot
-
-Array = NDArray[np.float64]
 
 ETA, THETA, DELTA = 0, 1, 2
 HEADING = np.array([1.0, 0.0, -1.0])  # ∂β/∂q: the platform turns at ω = η̇ − δ̇

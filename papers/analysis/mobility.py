@@ -10,10 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.robot import Robot, check_joints
 from papers.analysis.joint_kinematics import DELTA, THETA, forward_jacobian
-
-Array = NDArray[np.float64]
 
 PLANE = 3  # freedoms of a body in the plane
 CHAIN = (1, 1, 1)  # freedoms of a caster's joints

@@ -1,14 +1,12 @@
 """The term (D1) that a model of casters easily lacks: how large it is, and how motion shows it. docs/analysis.md, F."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array, Plane
 from caster_gym.engines.numpy_model import Model
-from caster_gym.paths.trajectory import Plane
 from caster_gym.robot import Robot
 from papers.analysis.driven_motion import DrivenMotion
-
-Array = NDArray[np.float64]
 
 _EDGE = 2  # samples at either end where differences of fourth order cannot be centred
 

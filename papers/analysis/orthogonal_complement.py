@@ -17,17 +17,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.analysis.checked import finite
 from caster_gym.analysis.frames import rate_in_body
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.dynamics import joint_friction
 from caster_gym.robot import Robot, check_joints
 from papers.analysis.joint_kinematics import forward_jacobian, inertial_hessian
 from papers.analysis.mobility import closed, loop_closure
-
-Array = NDArray[np.float64]
 
 INDEPENDENT = 3  # joint rates: as many as the platform has degrees of freedom
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
 from caster_gym.report.page import Check, Picture, Section, Table
@@ -19,8 +19,6 @@ from papers.chung2008.impulse_checks import (
     with_unrounded_pivots,
 )
 from papers.notation import CHUNG2008
-
-Array = NDArray[np.float64]
 
 JOINTS = ("steer_1", "steer_2", "steer_3")
 ROBOTS = ("chung2008", "xr4000", "tidybot2")

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.report.page import Section, Table
 from caster_gym.robot import load_robot
 from papers.analysis.coordinate_switching import (
@@ -38,8 +39,6 @@ from papers.chung2008.complement_runs import (
     relative,
 )
 from papers.notation import in_letters
-
-Array = NDArray[np.float64]
 
 LIMITS = (LIMIT, 1000.0)
 PAPER_ALONE, CHANGED = f"{in_letters(PAPER_SET)} alone", "changed above {:g}"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.report.drawing import COLOURS, new_figure
 from caster_gym.report.page import Picture
 from papers.analysis.coordinate_switching import singular_steering
@@ -17,7 +18,6 @@ from papers.notation import in_letters
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 BAD, BETTER, GOOD, PLAIN = COLOURS[3], COLOURS[2], COLOURS[0], COLOURS[4]
 LEAST, GREATEST = 1e-17, 1e17  # what is drawn of numbers beyond: errors of zero, condition numbers without bound

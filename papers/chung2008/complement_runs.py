@@ -3,16 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import action_lines
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import Robot
 from papers.analysis.coordinate_switching import forward_dynamics, singular_steering
 from papers.analysis.driven_motion import steady_steering
 from papers.analysis.orthogonal_complement import OrthogonalComplement
-
-Array = NDArray[np.float64]
 
 DISTANCES = np.logspace(0.0, -16.0, 33)  # [rad] from a singular configuration
 DECADES = (DISTANCES < 0.5) & (DISTANCES > 1e-5)  # near enough to see a power, not so near that only rounding is left

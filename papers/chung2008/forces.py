@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.shapes import Circle
@@ -15,8 +15,6 @@ from papers.analysis.model_comparison import carried_mass
 from papers.chung2008 import inertia, wheel_mass
 from papers.chung2008.motion_pictures import FORCE_AXES, draw_energy, draw_forces, draw_joints, draw_path
 from papers.notation import CHUNG2008
-
-Array = NDArray[np.float64]
 
 RADIUS = 1.0  # [m] of Fig. 5
 DURATION = 60.0  # [s]

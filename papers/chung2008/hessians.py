@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from caster_gym.analysis.frames import turned
+from caster_gym.arrays import Array
 from caster_gym.report.drawing import COLOURS, new_figure
 from caster_gym.report.page import Check, Difference, Picture, Section, Table
 from caster_gym.robot import Robot
 from papers.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
 from papers.chung2008.kinematics import Sample
 from papers.jacobian_checks import ROUNDING
-from papers.notation import CHUNG2008, Array
+from papers.notation import CHUNG2008
 from papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 
 if TYPE_CHECKING:

@@ -1,8 +1,9 @@
 """What chung2008 says of the impulse of a collision, checked, and where we differ."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.page import Check, Difference
 from caster_gym.robot import Robot
@@ -14,8 +15,6 @@ from papers.analysis.impulse_shape import (
     extremes,
 )
 from papers.notation import CHUNG2008
-
-Array = NDArray[np.float64]
 
 CONFIGURATIONS = {
     "Fig. 16": (0.0, 0.0, 0.0),

@@ -4,6 +4,7 @@ import numpy as np
 
 from caster_gym.agents.comparison.track_metrics import SETTLING
 from caster_gym.agents.control.computed_torque import gains
+from caster_gym.arrays import Array
 from caster_gym.report.page import Check, Difference, Section, Table
 from papers.chung2008.model_figures import picture
 from papers.chung2008.model_trials import (
@@ -22,7 +23,6 @@ from papers.chung2008.model_trials import (
     SOFT,
     STARTS,
     STIFF,
-    Array,
     Study,
     exponents,
     study,

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import JointSet, classify_all, proved_brackets, rounded_down
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, wheel_centre
@@ -19,7 +20,7 @@ from papers.jacobian_checks import (
     comparison_table,
     off_inverse,
 )
-from papers.notation import CHUNG2008, Array, Lengths, in_letters, lengths_of
+from papers.notation import CHUNG2008, Lengths, in_letters, lengths_of
 from papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 
 COUNT = 1000  # random configurations

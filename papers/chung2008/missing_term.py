@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.random_paths import RandomPaths
@@ -15,8 +15,6 @@ from caster_gym.robot import Robot, load_robot
 from papers.analysis.driven_motion import DrivenMotion, inertial_force, lead
 from papers.analysis.model_comparison import carried_mass, force_by_momenta, force_size, missing_force
 from papers.chung2008.missing_term_pictures import FORCE_AXES, Forces, picture_at_random, picture_on_circle
-
-Array = NDArray[np.float64]
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
 ON_CIRCLE = ("chung2008", "xr4000")  # that are drawn

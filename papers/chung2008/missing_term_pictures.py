@@ -3,15 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.report.drawing import COLOURS, new_figure
 from caster_gym.report.page import Picture
 from papers.chung2008.motion_pictures import FORCE_AXES
 
 __all__ = ["FORCE_AXES", "Forces", "picture_at_random", "picture_on_circle"]
-
-Array = NDArray[np.float64]
 
 
 class Forces(NamedTuple):

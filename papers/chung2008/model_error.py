@@ -13,19 +13,17 @@ along its way, but for the square of its speed.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from caster_gym.agents.control.computed_torque import Gains, KnownModel, known_model
 from caster_gym.analysis.frames import motion_in_body
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.specification import AnyPath
 from caster_gym.paths.trailing import trailing_directions
 from caster_gym.robot import Robot
-
-Array: TypeAlias = NDArray[np.float64]
 
 _STEP = 0.25  # [-] of the trail: way of a pivot between two steps of its caster's direction
 

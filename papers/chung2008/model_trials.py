@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Any, NamedTuple, TypeAlias, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from caster_gym.agents.comparison.evaluation import Episodes, roll_out
 from caster_gym.agents.comparison.measuring import rms
 from caster_gym.agents.comparison.track_metrics import SETTLING, measure
 from caster_gym.agents.control.computed_torque import ComputedTorque, Gains, KnownModel, gains, known_model
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.observation import ObservationLayout
@@ -22,8 +23,6 @@ from caster_gym.paths.specification import AnyPath
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot, load_robot
 from papers.chung2008.model_error import lacks, predict, trailing_steering
-
-Array: TypeAlias = NDArray[np.float64]
 
 MODELS: tuple[KnownModel, ...] = get_args(KnownModel)  # the exact one first
 EXACT, PRINTED, BARE = range(3)  # of MODELS

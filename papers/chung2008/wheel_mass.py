@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.headings import Heading, Spinning, Tangent
 from caster_gym.paths.shapes import Circle, Ellipse, Shape
@@ -12,8 +12,6 @@ from caster_gym.report.drawing import new_figure
 from caster_gym.report.page import Check, Difference, Picture, Section, Table
 from caster_gym.robot import Robot, Wheel, load_robot
 from papers.analysis.driven_motion import inertial_force, lead
-
-Array = NDArray[np.float64]
 
 BASE = 0.1  # [m] radius b of the platform, a disc
 TIME_STEP = 0.05  # [s]

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from caster_gym.design.isotropy import INTERVAL, Array
+from caster_gym.arrays import Array
+from caster_gym.design.isotropy import INTERVAL
 from caster_gym.report.page import Check, Difference, Picture, Section, Table, check_number
 from papers.kim2001.isotropy_pictures import FIGURES, contours, local_indices
 from papers.kim2001.isotropy_search import (

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
 from caster_gym.report.page import Check, Difference, Picture, Section, check_number
@@ -15,7 +16,7 @@ from papers.jacobian_checks import (
     comparison_table,
     off_inverse,
 )
-from papers.notation import CHUNG2008, KIM2001, Array, Lengths, Notation, kim2001_robot, lengths_of
+from papers.notation import CHUNG2008, KIM2001, Lengths, Notation, kim2001_robot, lengths_of
 from papers.printed_jacobians import (
     KIM2001_FORWARD,
     KIM2001_FOUR,

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
 from caster_gym.design.singular_lines import MEETS, action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
@@ -17,7 +17,6 @@ from papers.notation import kim2001_robot
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 ROBOTS, CONFIGURATIONS = 200, 500  # robots drawn at random, configurations of each
 STEPS = 20  # configurations around each singular one

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
-from caster_gym.design.singular_lines import Array, action_lines, meeting, smallest_singular_value
+from caster_gym.design.singular_lines import action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.drawing import new_figure
 from caster_gym.report.page import Check, Difference, Picture, Section

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from caster_gym.arrays import Array
 from caster_gym.engines.memory import check_memory
 from caster_gym.engines.native.compilation import Work
 from caster_gym.engines.native.compiler import INLINE, compiled
@@ -209,7 +210,7 @@ class Fleet:
         parameters = np.array([packed[id(robot)] for robot in listed])
         self._longest = float(longest_of_robots(self._distinct).min())
         first = parameter_row(self._casters, self._floor)
-        self._blocks: NDArray[np.float64] = np.zeros((block_count(self.count), (first + parameters.shape[1]) * LANES))
+        self._blocks: Array = np.zeros((block_count(self.count), (first + parameters.shape[1]) * LANES))
         to_lanes(parameters, self._blocks, first)
         if self._floor is not None:
             friction = parameters[:, PlatformParameters._fields.index("floor_friction"), None]
@@ -221,7 +222,7 @@ class Fleet:
         self.state = at_rest
 
     @property
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """A copy of all states (count, 7 + 2 N), on a floor of finite friction (count, 9 + 4 N)."""
         return from_lanes(self._blocks, 0, self._torque_row, self.count)
 
@@ -243,7 +244,7 @@ class Fleet:
         to_lanes(np.zeros((self.count, 1)), self._blocks, self._room_row)
 
     @property
-    def slip(self) -> NDArray[np.float64]:
+    def slip(self) -> Array:
         """Velocities (count, N, 2) of the wheels' material points over the floor along f and f⊥. [m/s]"""
         if self._floor is None:
             return np.zeros((self.count, len(self._casters), 2))
@@ -257,7 +258,7 @@ class Fleet:
         width = self._blocks.shape[1] // LANES - first
         return unpack_parameters(tuple(from_lanes(self._blocks, first, width, self.count).T))
 
-    def _rolling(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _rolling(self, state: Array) -> Array:
         """States (count, 7 + 2 N) as those of wheels that may slip, but do not yet."""
         return np.array(pack_state(rolling_state(unpack_state(tuple(state.T)), self._numbers()))).T
 
@@ -275,7 +276,7 @@ class Fleet:
         else:
             over_blocks(_compiled_step_blocks, len(self._blocks), self._blocks, self.count, *arguments)
 
-    def _checked(self, name: str, value: ArrayLike, width: int) -> NDArray[np.float64]:
+    def _checked(self, name: str, value: ArrayLike, width: int) -> Array:
         array = np.asarray(value, dtype=np.float64)
         if array.shape != (self.count, width):
             raise ValueError(f"{name} must have shape {(self.count, width)}, got {array.shape}")

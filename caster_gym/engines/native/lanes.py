@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numba.extending import overload, register_jitable
-from numpy.typing import NDArray
 
+from caster_gym.arrays import Array
 from caster_gym.engines.native.compiler import INLINE
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import (
@@ -34,7 +34,7 @@ def block_count(robots: int) -> int:
     return -(-robots // LANES)
 
 
-def to_lanes(rows: NDArray[np.float64], blocks: NDArray[np.float64], first_row: int) -> None:
+def to_lanes(rows: Array, blocks: Array, first_row: int) -> None:
     """Put quantities (robots, rows) into blocks (blocks, rows · LANES), from a row on; spare lanes copy the last."""
     count, width = rows.shape
     view = blocks.reshape(len(blocks), -1, LANES)[:, first_row : first_row + width]
@@ -42,7 +42,7 @@ def to_lanes(rows: NDArray[np.float64], blocks: NDArray[np.float64], first_row: 
     view[:] = padded.reshape(len(blocks), LANES, width).transpose(0, 2, 1)
 
 
-def from_lanes(blocks: NDArray[np.float64], first_row: int, width: int, robots: int) -> NDArray[np.float64]:
+def from_lanes(blocks: Array, first_row: int, width: int, robots: int) -> Array:
     """Quantities (robots, width) from blocks, from a row on, as a copy."""
     view = blocks.reshape(len(blocks), -1, LANES)[:, first_row : first_row + width]
     return np.ascontiguousarray(view.transpose(0, 2, 1).reshape(-1, width)[:robots])
