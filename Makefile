@@ -2,18 +2,20 @@
 PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/installed
+PYTEST := $(BIN)/python -m pytest --numprocesses logical --dist loadfile --no-loadscope-reorder
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 LOWEST := .venv-lowest
 LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_splines paths_specification \
-  paths_trajectory export_mjcf engines_numba engines_cores engines_compilation engines_compiled_files envs_caster_track \
-  agents_settings agents_bundle agents_run_folder wrappers_specification
+  paths_trajectory export_mjcf engines_numba engines_native_cores engines_native_compilation \
+  engines_native_compiled_files envs_caster_track agents_settings agents_learning_bundle report_run_folder \
+  wrappers_specification
 
-.PHONY: help install benchmark pictures papers test lowest lint format clean
+.PHONY: help install benchmark pictures papers test quick papers-test lowest lint format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 install: $(INSTALLED) ## Virtual environment in .venv with the package, editable, and all tools
 
@@ -34,8 +36,14 @@ papers: $(INSTALLED) ## Both papers reproduced: pages, figures and tables in doc
 	$(BIN)/python -m papers chung2008 --out docs/papers --overwrite
 	$(BIN)/python -m papers kim2001 --out docs/papers --overwrite
 
-test: lint ## Lint, then all tests
-	$(BIN)/python -m pytest
+test: lint ## Lint, then all tests, a worker on each core
+	$(PYTEST)
+
+quick: $(INSTALLED) ## The fast tests alone, in less than 90 s on two cores once their code is compiled
+	$(PYTEST) -m "not slow" --ignore tests/papers
+
+papers-test: $(INSTALLED) ## Tests of papers/ alone
+	$(PYTEST) tests/papers
 
 lowest: $(LOWEST)/installed ## Some of the tests with the lowest versions that pyproject.toml allows
 	$(LOWEST)/bin/python -m pytest $(LOWEST_TESTS:%=tests/test_%.py)
@@ -55,4 +63,4 @@ format: $(INSTALLED) ## Bring the sources into shape
 	$(BIN)/ruff format
 
 clean: ## Remove the environment and caches, keep runs/
-	rm -rf .venv $(LOWEST) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf .venv $(LOWEST) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
