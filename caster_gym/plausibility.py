@@ -53,7 +53,7 @@ def _outside(field: str, value: float, unit: str, low: float, high: float, usual
 
 
 def _platform_doubts(robot: "Robot") -> Iterator[_Doubt]:
-    platform, reach, area = robot.platform, robot.platform.footprint.reach, robot.platform.footprint.area
+    platform, reach, area = robot.platform, robot.platform.footprint.outline.reach, robot.platform.footprint.area
     yield from _outside("platform.footprint", reach, "m from C", 0.01, 10.0, "usual are 0.1 … 1")
     per_area = platform.mass / area
     yield from _outside(
@@ -78,8 +78,8 @@ def _platform_doubts(robot: "Robot") -> Iterator[_Doubt]:
     yield from _outside("platform.com", away, "m from C", 0.0, reach, f"outside of the outline of {reach:.2g} m")
     tall = f"where the outline reaches {reach:.2g} m from C; usual are 0.3 … 2 of that"
     yield from _outside("platform.height", platform.height, "m", 0.0, 10.0 * reach, tall)
-    if any(motor.coulomb > 0.0 for caster in robot.casters for motor in (caster.roll, caster.steer)):
-        slowest = min(min(caster.roll.max_speed, caster.steer.max_speed) for caster in robot.casters)
+    if any(motor.coulomb > 0.0 for motor in robot.motors):
+        slowest = min(motor.max_speed for motor in robot.motors)
         yield from _outside(
             "coulomb_speed",
             robot.coulomb_speed,
@@ -93,7 +93,7 @@ def _platform_doubts(robot: "Robot") -> Iterator[_Doubt]:
 
 
 def _caster_doubts(caster: "Caster", robot: "Robot") -> Iterator[_Doubt]:
-    reach, mass = robot.platform.footprint.reach, robot.platform.mass
+    reach, mass = robot.platform.footprint.outline.reach, robot.platform.mass
     size = f"where the platform's outline reaches {reach:.2g} m from C"
     away = float((caster.x**2 + caster.y**2) ** 0.5)
     yield from _outside("x, y", away, "m from C", 0.0, 2.0 * reach, size)

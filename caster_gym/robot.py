@@ -8,8 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 
+from caster_gym.arrays import Array
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.floor import GREATEST
+from caster_gym.outlines import Outline, convex, polygon_fault
 from caster_gym.plausibility import warn_if_implausible
 
 
@@ -81,9 +83,14 @@ class Caster(Frozen):
     @property
     def top_speed(self) -> float:
         """Speed of the wheel that rolls straight ahead at the top speed of the slower of the motors it turns. [m/s]"""
-        (roll, _), (steer, _) = self.gear
-        geared = ((self.roll, roll), (self.steer, steer))
-        return self.radius * min(motor.max_speed / abs(ratio) for motor, ratio in geared if ratio != 0.0)
+        ratios = [ratio for ratio, _ in self.gear]
+        turned = zip(self.motors, ratios, strict=True)
+        return self.radius * min(motor.max_speed / abs(ratio) for motor, ratio in turned if ratio != 0.0)
+
+    @property
+    def motors(self) -> tuple[Motor, Motor]:
+        """The motors of the rolling and of the steering joint."""
+        return self.roll, self.steer
 
 
 class Footprint(Frozen):
@@ -96,19 +103,14 @@ class Footprint(Frozen):
     def _one_shape_and_convex(self) -> Self:
         if (self.disc is None) == (self.polygon is None):
             raise ValueError("give exactly one of 'disc' (a radius) and 'polygon' (its corners)")
-        if self.polygon is not None:
-            corners = np.asarray(self.polygon)
-            edges = np.roll(corners, -1, axis=0) - corners
-            turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
-            turning = np.arctan2(turns, (edges * np.roll(edges, -1, axis=0)).sum(axis=1)).sum()
-            if not (turns > 0.0).all() or abs(turning - 2.0 * np.pi) > 1e-6:
-                raise ValueError("must be a convex polygon with its corners listed counter-clockwise")
+        if self.polygon is not None and polygon_fault(self.polygon):
+            raise ValueError("must be a convex polygon with its corners listed counter-clockwise")
         return self
 
     @property
-    def reach(self) -> float:
-        """Distance of the outline's farthest point from C. [m]"""
-        return self.disc or float(np.hypot(*np.asarray(self.polygon).T).max())
+    def outline(self) -> Outline:
+        """The shape, in B."""
+        return convex(self.polygon) if self.polygon else Outline((), ((0.0, 0.0),), self.disc or 0.0)
 
     @property
     def area(self) -> float:
@@ -187,6 +189,37 @@ class Robot(Frozen):
     def driven(self) -> tuple[str, ...]:
         """Names of the driven joints, in the order of `joints`."""
         return self.joints if self.actuation == "all" else tuple(j for j in self.joints if j in self.actuation)
+
+    @property
+    def driven_indices(self) -> list[int]:
+        """Places of the driven joints among all `joints`."""
+        return [self.joints.index(joint) for joint in self.driven]
+
+    @property
+    def motors(self) -> tuple[Motor, ...]:
+        """The motors of all joints, in the order of `joints`."""
+        return tuple(motor for caster in self.casters for motor in caster.motors)
+
+    @property
+    def max_torques(self) -> Array:
+        """Greatest torques (2 N,) of the motors. [N m]"""
+        return np.array([motor.max_torque for motor in self.motors])
+
+    @property
+    def max_speeds(self) -> Array:
+        """Speeds (2 N,) of the motors at which no torque is left. [rad/s]"""
+        return np.array([motor.max_speed for motor in self.motors])
+
+    @property
+    def reach(self) -> float:
+        """Greatest distance of the outline and of the wheels from C, however they are steered. [m]"""
+        wheels = [np.hypot(one.x, one.y) + np.hypot(one.trail, one.offset) + one.radius for one in self.casters]
+        return float(max(self.platform.footprint.outline.reach, *wheels))
+
+    @property
+    def pivot_reach(self) -> float:
+        """Distance of the farthest pivot from C. [m]"""
+        return max(float(np.hypot(caster.x, caster.y)) for caster in self.casters)
 
     @property
     def top_speed(self) -> float:

@@ -149,7 +149,7 @@ def impact_speed(robot: Robot) -> float:
     angle = rng.uniform(-np.pi, np.pi, DRAWS)
     normal = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
     twist = np.concatenate((-normal, np.zeros((DRAWS, 1))), axis=1)  # head-on at 1 m/s; all is in proportion to it
-    point = -robot.platform.footprint.reach * normal
+    point = -robot.platform.footprint.outline.reach * normal
     _, after = model.collide(steering, twist, point, normal, RESTITUTION)
     directions = tuple((np.cos(one), np.sin(one)) for one in steering.T)
     use = impact_traction(tuple((after - twist).T), directions, robot_parameters(robot))

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym.arena import Arena, read_arena
-from caster_gym.arena.outlines import convex
 from caster_gym.configuration import ConfigurationError
 
 FULL = {
@@ -70,17 +69,6 @@ def test_a_wall_is_as_thick_as_it_says_and_ends_where_it_says():
     along, across = (points - 1.0) @ [0.6, 0.8], (points - 1.0) @ [-0.8, 0.6]
     np.testing.assert_array_equal(inside, (along > 0.0) & (along < 5.0) & (abs(across) < 0.25))
     assert inside.sum() > 20
-
-
-def test_faces_of_an_outline_pass_through_its_corners_and_have_all_others_behind():
-    angles = np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 7))
-    corners = np.stack([2.0 * np.cos(angles) + 1.0, np.sin(angles)], -1)
-    faces = np.array(convex(tuple(map(tuple, corners))).faces)
-    assert_allclose(np.hypot(*faces[:, :2].T), 1.0, rtol=1e-14)
-    behind = faces[:, 2] - corners @ faces[:, :2].T  # (corner, face)
-    on_face = np.eye(7, dtype=bool) | np.roll(np.eye(7, dtype=bool), 1, axis=0)
-    assert_allclose(behind[on_face], 0.0, atol=1e-14)  # rounding of numbers of order 1
-    assert (behind[~on_face] > 0.0).all()
 
 
 def test_regular_polygons_of_any_size_are_convex():

@@ -13,7 +13,6 @@ from scipy.spatial import ConvexHull
 import caster_gym.engines.native.compiler
 import caster_gym.engines.tensor.model  # noqa: F401  teaches the choices and roots of tensors
 from caster_gym.arena import read_arena
-from caster_gym.arena.outlines import Outline, convex
 from caster_gym.arena.packing import hull_from, pack
 from caster_gym.mechanics.separation import (
     TOUCH,
@@ -23,6 +22,7 @@ from caster_gym.mechanics.separation import (
     contact_points,
     separation,
 )
+from caster_gym.outlines import Outline, convex
 
 ROUNDING = 1e-12  # m, some hundred times the rounding of numbers of a few metres
 KINDS = ("half_planes", "thin walls", "walls", "pillars", "polygons")

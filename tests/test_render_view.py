@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym import load_robot
-from caster_gym.render.view import Area, View, around, extent, fitted, grid, reach, round_length
+from caster_gym.render.view import Area, View, around, extent, fitted, grid, round_length
 from tests.scenes import CIRCLE, obstacles, scene
 
 AREA = Area(40.0, 10.0, 300.0, 200.0)
@@ -37,20 +36,6 @@ def test_a_view_around_a_point_shows_so_many_metres_of_the_shorter_side():
     top, bottom = view.metres([(190.0, 10.0), (190.0, 210.0)])
     assert top[1] - bottom[1] == pytest.approx(0.5)
     assert_allclose(view.pixels((4.0, 4.0)), AREA.centre)
-
-
-def test_the_reach_holds_the_wheels_however_they_are_steered():
-    """By trying all directions of every caster."""
-    robot = load_robot("tidybot2")
-    angles = np.linspace(0.0, 2.0 * np.pi, 721)
-    f = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    across = f @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    far = 0.0
-    for caster in robot.casters:
-        wheel = np.array([caster.x, caster.y]) - caster.trail * f + caster.offset * across
-        far = max(far, np.hypot(*(wheel + caster.radius * f).T).max(), np.hypot(*(wheel - caster.radius * f).T).max())
-    assert reach(robot) >= far
-    assert reach(robot) < 1.05 * max(far, *(np.hypot(*corner) for corner in robot.platform.footprint.polygon))
 
 
 def test_the_extent_holds_path_corridor_and_all_obstacles_that_end():

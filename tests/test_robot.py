@@ -150,7 +150,9 @@ def test_joints_alternate_between_rolling_and_steering(tmp_path):
     robot = load_robot(write(tmp_path))
     assert robot.joints == ("roll_1", "steer_1", "roll_2", "steer_2")
     assert robot.driven == robot.joints
-    assert robot.with_actuation(["steer_2", "roll_1"]).driven == ("roll_1", "steer_2")
+    some = robot.with_actuation(["steer_2", "roll_1"])
+    assert some.driven == ("roll_1", "steer_2")
+    assert some.driven_indices == [0, 3]
     assert robot.with_actuation(["roll_1"]).with_actuation("all") == robot
     with pytest.raises(ConfigurationError, match="steer_3"):
         robot.with_actuation(["steer_3"])
@@ -322,3 +324,17 @@ def test_xr4000_has_the_mass_matrix_of_its_makers():
     off = np.linalg.norm(ours - exact, axis=1) / np.linalg.norm(exact, axis=1)
     assert np.median(off) < 3e-3
     assert off.max() < 1.5e-2
+
+
+def test_the_reach_holds_the_wheels_however_they_are_steered():
+    """By trying all directions of every caster."""
+    robot = load_robot("tidybot2")
+    angles = np.linspace(0.0, 2.0 * np.pi, 721)
+    f = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    across = f @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    far = 0.0
+    for caster in robot.casters:
+        wheel = np.array([caster.x, caster.y]) - caster.trail * f + caster.offset * across
+        far = max(far, np.hypot(*(wheel + caster.radius * f).T).max(), np.hypot(*(wheel - caster.radius * f).T).max())
+    assert robot.reach >= far
+    assert robot.reach < 1.05 * max(far, *(np.hypot(*corner) for corner in robot.platform.footprint.polygon))

@@ -17,7 +17,6 @@ from caster_gym.agents.settings import TaskSettings
 from caster_gym.envs.scene import Scene
 from caster_gym.paths.naming import unknown_name
 from caster_gym.render.recording import check_target, recording
-from caster_gym.render.view import reach
 from caster_gym.render.viewer import MOST, SIZE, Viewer, has_display
 from caster_gym.shipped_files import read_settings
 
@@ -69,7 +68,7 @@ def watch(
     end = np.inf if seconds is None else round(seconds / period)
     longest = np.inf if driving else int(engine.plan.guide.spans[paths, 2].max())
     mode = "rgb_array" if save is not None and not driving else "human"
-    around = SURROUNDINGS * reach(engine.robot) if driving else None
+    around = SURROUNDINGS * engine.robot.reach if driving else None
     with ExitStack() as stack:
         writer = None if save is None else stack.enter_context(recording(save, 1.0 / period, overwrite))
         viewer = stack.enter_context(_open(Viewer(mode, size, 1.0 / period, around)))

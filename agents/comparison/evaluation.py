@@ -103,8 +103,8 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
     observations, _ = batch.reset(seed=seed, options={"path": path})
     running = np.ones(batch.num_envs, dtype=np.bool_)
     failed = np.zeros(batch.num_envs, dtype=np.bool_)
-    limits = np.array([motor.max_torque for caster in robot.casters for motor in (caster.roll, caster.steer)])
-    driven = [robot.joints.index(joint) for joint in robot.driven]
+    limits = robot.max_torques
+    driven = robot.driven_indices
     rows: list[dict[str, Array]] = []
     while running.any():
         actions = agent.act(observations)

@@ -67,10 +67,8 @@ class ComputedTorque:
         self.gains = gains(natural_frequency, period)
         self._model = known_model(layout.robot, known)
         robot = layout.robot
-        driven = [robot.joints.index(joint) for joint in robot.driven]
-        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-        self._max_torque = np.array([motor.max_torque for motor in motors])[driven]
-        self._max_speed = np.array([motor.max_speed for motor in motors])[driven]
+        self._max_torque = robot.max_torques[robot.driven_indices]
+        self._max_speed = robot.max_speeds[robot.driven_indices]
 
     @property
     def name(self) -> str:

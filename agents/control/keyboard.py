@@ -55,8 +55,7 @@ class KeyboardDriver(ComputedTorque):
 def greatest_twist(robot: Robot) -> Array:
     """The twist (3,) that a person may ask for: slow enough for the motors and for the person."""
     speed = min(SHARE * robot.top_speed, MOST_SPEED)
-    farthest = max(float(np.hypot(caster.x, caster.y)) for caster in robot.casters)
-    return np.array([speed, speed, min(speed / farthest, MOST_YAW_RATE)])
+    return np.array([speed, speed, min(speed / robot.pivot_reach, MOST_YAW_RATE)])
 
 
 def wanted_shares(held: frozenset[str]) -> Array:

@@ -6,9 +6,9 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, model_validator
 
-from caster_gym.arena.outlines import Outline, convex, polygon_fault
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.mechanics.impulse import ImpactLaw
+from caster_gym.outlines import Outline, convex, polygon_fault
 
 FARTHEST = 1e6  # [m] from the origin
 

@@ -5,19 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from caster_gym.arena.arena import Arena
-from caster_gym.arena.outlines import Outline, convex
 from caster_gym.arrays import Array, Indices
 from caster_gym.mechanics.impulse import LAWS
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
+from caster_gym.outlines import Outline
 from caster_gym.robot import Robot
 
 
 def hull_of(robot: Robot) -> Hull:
     """The outline of a robot's platform, in B."""
-    footprint = robot.platform.footprint
-    if footprint.disc is not None:
-        return hull_from(Outline((), ((0.0, 0.0),), footprint.disc))
-    return hull_from(convex(footprint.polygon or ()))  # a footprint has one of the two
+    return hull_from(robot.platform.footprint.outline)
 
 
 def surroundings(robot: Robot, arena: Arena) -> Surroundings:
@@ -27,9 +24,7 @@ def surroundings(robot: Robot, arena: Arena) -> Surroundings:
 
 def hull_from(outline: Outline) -> Hull:
     """A hull of any outline about the origin of its frame."""
-    corners = _table(outline.corners, 2)
-    reach = float(np.hypot(corners[:, 0], corners[:, 1]).max()) + outline.radius
-    return Hull(_table(outline.faces, 3), corners, outline.radius, reach)
+    return Hull(_table(outline.faces, 3), _table(outline.corners, 2), outline.radius, outline.reach)
 
 
 def pack(arenas: Sequence[Arena]) -> tuple[Obstacles, Indices]:

@@ -35,7 +35,7 @@ from caster_gym.paths.feasibility import least_effort
 from caster_gym.paths.moments import Motion, hard_spans, moments_within, motion_at, sampled
 from caster_gym.paths.moments import joined as joined_spans
 from caster_gym.paths.trajectory import Trajectory
-from caster_gym.robot import Motor, Robot
+from caster_gym.robot import Robot
 
 SAMPLES = 1024  # motions of each stage; a power of two, as Sobol's sequence likes it
 REST, FLIP, FULL, TOP = range(4)
@@ -149,18 +149,10 @@ def measures(loads: Loads, robot: Robot, margin: float) -> Array:
     return np.concatenate([uses, torque, loads.speed, loads.along * loads.speed])
 
 
-def driven_motors(robot: Robot) -> list[Motor]:
-    """The motors of the driven joints."""
-    motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-    return [motors[robot.joints.index(joint)] for joint in robot.driven]
-
-
 def motor_uses(loads: Loads, robot: Robot, margin: float) -> Array:
     """Use (J, ...) of each driven motor with a margin: 1 is the limit, infinite at and beyond its top speed. (S5)"""
-    motors, shape = driven_motors(robot), (-1, *(1,) * (loads.speed.ndim - 1))
-    sizes, tops = (
-        np.array(column).reshape(shape) for column in zip(*((m.max_torque, m.max_speed) for m in motors), strict=True)
-    )
+    driven, shape = robot.driven_indices, (-1, *(1,) * (loads.speed.ndim - 1))
+    sizes, tops = robot.max_torques[driven].reshape(shape), robot.max_speeds[driven].reshape(shape)
     low, high = torque_range(margin * loads.speed, sizes, tops)
     with np.errstate(divide="ignore"):
         along = np.where(high > 0.0, margin * loads.along / np.where(high > 0.0, high, 1.0), np.inf)
@@ -226,7 +218,7 @@ def least_possible_share(motions: Motions, robot: Robot, target: Target) -> floa
     v, f, held, spread = placed(motions, robot, target)
     forces = [np.stack(np.broadcast_arrays(*force)) for force in force_per_acceleration(v, f, held, parameters)]
     pairs = flatten(each(motor_wrenches, (), f, parameters.casters))
-    wrenches = [np.stack(np.broadcast_arrays(*pairs[j])) for j in _driven(robot)]
+    wrenches = [np.stack(np.broadcast_arrays(*pairs[j])) for j in robot.driven_indices]
     worst = 0.0
     for p, q in combinations(wrenches, 2):
         normal = np.cross(p, q, axis=0)
@@ -244,16 +236,12 @@ def _columns(vectors: Array) -> Vector:
     return vectors[:, 0], vectors[:, 1], vectors[:, 2]
 
 
-def _driven(robot: Robot) -> list[int]:
-    return [robot.joints.index(joint) for joint in robot.driven]
-
-
 def _motor_torques(force: Vector, f: tuple[Direction, ...], robot: Robot, parameters: RobotParameters) -> Array:
     """Torques (J, S) of the driven motors that give a force with the least effort. [N m]"""
     effort, _ = least_effort(force, f, parameters)
     wrenches = flatten(each(motor_wrenches, (), f, parameters.casters))
-    sizes = [size for caster in robot.casters for size in (caster.roll.max_torque, caster.steer.max_torque)]
-    return np.stack([sizes[j] * dot(wrenches[j], effort) for j in _driven(robot)])
+    sizes = robot.max_torques
+    return np.stack([sizes[j] * dot(wrenches[j], effort) for j in robot.driven_indices])
 
 
 def _speeds(v: Vector, f: tuple[Direction, ...], robot: Robot, parameters: RobotParameters) -> Array:
@@ -263,7 +251,7 @@ def _speeds(v: Vector, f: tuple[Direction, ...], robot: Robot, parameters: Robot
             motor_speeds(joint_rates(v, one, caster), caster) for one, caster in zip(f, parameters.casters, strict=True)
         )
     )
-    return np.stack([speeds[j] for j in _driven(robot)])
+    return np.stack([speeds[j] for j in robot.driven_indices])
 
 
 def _loads(torque: Array, reach: Array, speed: Array) -> Loads:

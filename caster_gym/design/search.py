@@ -18,7 +18,6 @@ from caster_gym.analysis.actuation import SINGULAR, worst_conditioning
 from caster_gym.arrays import Array
 from caster_gym.design.envelope import (
     Motions,
-    driven_motors,
     envelope_loads,
     joined,
     motor_uses,
@@ -262,7 +261,7 @@ def _fast_enough(robot: Robot, target: DesignTarget, region: Region) -> str:
             caster.model_copy(
                 update={
                     name: motor.model_copy(update={"max_speed": factor * motor.max_speed})
-                    for name, motor in (("roll", caster.roll), ("steer", caster.steer))
+                    for name, motor in zip(("roll", "steer"), caster.motors, strict=True)
                 }
             )
             for caster in robot.casters
@@ -331,7 +330,7 @@ class _Search:
             radius,
             trail,
             (target.speed, target.speed, target.yaw_rate),
-            [motor.max_speed for motor in driven_motors(self.robot)],
+            self.robot.max_speeds[self.robot.driven_indices],
             isotropy_interval(self.robot.caster_count),
         )
 

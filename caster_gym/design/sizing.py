@@ -12,7 +12,6 @@ from caster_gym.arrays import Array
 from caster_gym.design.envelope import (
     Loads,
     Motions,
-    driven_motors,
     envelope_loads,
     joined,
     least_possible_share,
@@ -81,7 +80,7 @@ def trajectories_of(target: Target) -> tuple[Trajectory, ...]:
 
 def motor_shares(loads: Loads, robot: Robot, margin: float) -> Array:
     """Torque (J, S) of each driven motor with a margin, as a share of its greatest, whatever its speed. (S9)"""
-    sizes = np.array([motor.max_torque for motor in driven_motors(robot)])[:, None]
+    sizes = robot.max_torques[robot.driven_indices, None]
     shares: Array = margin * np.maximum(loads.along, loads.against) / sizes
     return shares
 
@@ -103,7 +102,7 @@ def require(robot: Robot, target: Target, motions: Motions | None = None) -> Req
     if paths := trajectories_of(target):
         parts.append(path_loads(paths, full, target.margin))
     loads = together(parts)
-    motors = driven_motors(full)
+    motors = [full.motors[j] for j in full.driven_indices]
     k = target.margin
     torque, power = np.maximum(loads.along, loads.against), loads.along * loads.speed
     uses = motor_uses(loads, full, k)
@@ -175,7 +174,7 @@ def sized(robot: Robot, requirement: Requirement) -> Robot:
     casters = []
     for i, caster in enumerate(robot.casters, start=1):
         changed = {}
-        for kind, motor in (("roll", caster.roll), ("steer", caster.steer)):
+        for kind, motor in zip(("roll", "steer"), caster.motors, strict=True):
             changed[kind] = motor.model_copy(
                 update={
                     "max_torque": motor.max_torque * requirement.factor,

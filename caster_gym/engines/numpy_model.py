@@ -60,7 +60,7 @@ class Model:
         directions = self._directions(steering)
         names = self.robot.joints if joints == "all" else check_joints(_listed(joints), self.robot.caster_count)
         rows = each(caster.rate_rows, (), directions, self._parameters.casters)
-        chosen = [rows[self.robot.joints.index(name) // 2][1 + self.robot.joints.index(name) % 2] for name in names]
+        chosen = [rows[j // 2][1 + j % 2] for j in map(self.robot.joints.index, names)]
         return self._stack([self._stack(row) for row in chosen], -2)
 
     def inertia(self, steering: ArrayLike) -> Array:
@@ -142,8 +142,8 @@ class Model:
     def motor_wrenches(self, steering: ArrayLike) -> Array:
         """Wrenches (..., 3, driven) at C, in B, of the driven motors, each at its greatest torque. [N, N, N m]"""
         pairs_of = each(actuation.motor_wrenches, (), self._directions(steering), self._parameters.casters)
-        wrenches = dict(zip(self.robot.joints, flatten(pairs_of), strict=True))
-        return self._stack([self._stack(wrenches[joint]) for joint in self.robot.driven])
+        wrenches = flatten(pairs_of)
+        return self._stack([self._stack(wrenches[j]) for j in self.robot.driven_indices])
 
     def conditioning(self, steering: ArrayLike) -> Array:
         """σ_min / σ_max (...) of the wrenches of the driven motors; 0 where they cannot push the robot somewhere."""

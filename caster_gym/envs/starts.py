@@ -226,7 +226,7 @@ def check_motion(robot: Robot, steering: Array, twist: Array) -> None:
     _, rolling, turning = Model(robot).rates(steering, twist)
     gears = np.array([caster.gear for caster in robot.casters])
     motors = gears[:, :, 0] * rolling[..., None] + gears[:, :, 1] * turning[..., None]
-    limits = np.array([(caster.roll.max_speed, caster.steer.max_speed) for caster in robot.casters])
+    limits = robot.max_speeds.reshape(-1, 2)
     driven = np.array([joint in robot.driven for joint in robot.joints]).reshape(limits.shape)
     excess = np.where(driven, np.abs(motors) / limits, 0.0)
     if (excess > _BY_ROUNDING).any():

@@ -98,7 +98,7 @@ def _what_belongs_together(time_step: float, friction: float) -> str:
 
 def _note_on_dry_friction(robot: Robot) -> str:
     """A comment on what MuJoCo does otherwise, for a robot with dry friction."""
-    if not any(motor.coulomb for caster in robot.casters for motor in (caster.roll, caster.steer)):
+    if not any(motor.coulomb for motor in robot.motors):
         return ""
     creep = 1e3 * robot.coulomb_speed * max(caster.radius for caster in robot.casters) / 3.0**0.5
     return f"""
@@ -146,11 +146,10 @@ def _caster_body(number: int, caster: Caster) -> str:
 
 def _hinge(name: str, axis: str, caster: Caster, joint: int) -> str:
     """The rolling joint, 0, or the steering joint, 1, with the rotors of motors that turn it alone."""
-    motors = (caster.roll, caster.steer)
-    motor = motors[joint]
+    motor = caster.motors[joint]
     alone = (
         one.rotor * ratios[joint] ** 2
-        for one, ratios in zip(motors, caster.gear, strict=True)
+        for one, ratios in zip(caster.motors, caster.gear, strict=True)
         if ratios[joint] and not ratios[1 - joint]
     )
     armature = _numbers(motor.armature + sum(alone))
@@ -166,7 +165,7 @@ def _tendons(number: int, caster: Caster, driven: Sequence[str]) -> str:
     """What each motor of both joints has turned, if it is driven or has a rotor; with scrub also the wheel's yaw over
     ground, that of platform and steering."""
     turned = ""
-    for kind, motor, (roll, steer) in zip(_KINDS, (caster.roll, caster.steer), caster.gear, strict=True):
+    for kind, motor, (roll, steer) in zip(_KINDS, caster.motors, caster.gear, strict=True):
         if roll and steer and (motor.rotor or f"{kind}_{number}" in driven):
             rotor = f' armature="{_numbers(motor.rotor)}"' if motor.rotor else ""
             turned += (
@@ -183,7 +182,7 @@ def _tendons(number: int, caster: Caster, driven: Sequence[str]) -> str:
 def _motors(number: int, caster: Caster, driven: Sequence[str]) -> str:
     """The driven motors of a caster, each on the joint that it turns or, if it turns both, on its tendon."""
     motors = ""
-    for kind, motor, ratios in zip(_KINDS, (caster.roll, caster.steer), caster.gear, strict=True):
+    for kind, motor, ratios in zip(_KINDS, caster.motors, caster.gear, strict=True):
         name, span = f"{kind}_{number}", _numbers(-motor.max_torque, motor.max_torque)
         if name not in driven:
             continue

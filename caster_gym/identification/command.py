@@ -108,7 +108,7 @@ def write_example(path: Path, robot: str, seed: int, overwrite: bool) -> str:
     """A recording of a robot that carries a payload which its file does not know, with noise; says what it carries."""
     check_file(path, overwrite, "--example")
     bare = load_robot(robot)
-    reach = max(float(np.hypot(caster.x, caster.y)) for caster in bare.casters)
+    reach = bare.pivot_reach
     load = {"payload_mass": 0.2 * bare.platform.mass, "payload_x": 0.4 * reach, "payload_y": -0.2 * reach}
     shaken = record(robot_with(bare, load), EXAMPLE_SECONDS, EXAMPLE_STEP, seed, with_rolling=True)
     write_recording(path, shaken.noisy(EXAMPLE_NOISE, np.random.default_rng((seed, 1))))

@@ -41,13 +41,12 @@ class Shapes:
 
     def __init__(self, robot: Robot) -> None:
         slowest, middle = _SHARPEST * robot.coulomb_speed, _PLATEAU * robot.coulomb_speed
-        fastest = max(motor.max_speed for caster in robot.casters for motor in (caster.roll, caster.steer))
+        fastest = float(robot.max_speeds.max())
         self._slow = np.geomspace(slowest, middle, _count(middle / slowest))
         self._fast = np.geomspace(middle, max(fastest, _RATIO * middle), _count(fastest / middle))[1:]
         own = [0] * (len(self._slow) - 1) + [1] * len(self._fast)
         self.groups = np.array([*own, *(group + 2 for group in own)])  # (K,) which standard deviation a factor has
-        limits = [[getattr(caster, key).max_torque for caster in robot.casters] for key in ("roll", "steer")]
-        self.greatest = np.mean(limits, axis=1)  # (2,) torque of the motors [N m]
+        self.greatest = np.mean(robot.max_torques.reshape(-1, 2).T.copy(), axis=1)  # (2,) torque of the motors [N m]
         self.units = np.repeat(_UNIT * self.greatest, len(own))  # (K,) [N m]
 
     def pushes(self, shooting: Shooting, path: Array, values: Array) -> Array:

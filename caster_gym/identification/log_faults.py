@@ -92,9 +92,8 @@ def torques_missing(recording: Recording) -> Finding | None:
 
 def torques_too_large(recording: Recording, robot: Robot) -> Finding | None:
     """Torques far beyond what motors give: a log in another unit, or of currents."""
-    limits = [getattr(caster, kind).max_torque for caster in robot.casters for kind in ("roll", "steer")]
-    names = [f"torque_{kind}_{i + 1}" for i in range(robot.caster_count) for kind in ("roll", "steer")]
-    shares = np.quantile(np.abs(recording.torque), _MOSTLY, axis=0) / np.array(limits)  # (2 N,)
+    limits, names = robot.max_torques, [f"torque_{joint}" for joint in robot.joints]
+    shares = np.quantile(np.abs(recording.torque), _MOSTLY, axis=0) / limits  # (2 N,)
     if shares.max() <= _BEYOND_LIMITS:
         return None
     worst = int(shares.argmax())

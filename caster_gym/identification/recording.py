@@ -114,8 +114,8 @@ def record(
             f"a recording needs {FEWEST_ROWS} steps or more, got {seconds:g} s in steps of {time_step:g} s"
         )
     rng, model = np.random.default_rng(seed), Model(robot, dynamics)
-    driven = [robot.joints.index(joint) for joint in robot.driven]
-    limits = np.array([motor.max_torque for caster in robot.casters for motor in (caster.roll, caster.steer)])[driven]
+    driven = robot.driven_indices
+    limits = robot.max_torques[driven]
     lengths = np.array([1.0, 1.0, model.characteristic_length])
     force = share * sum(caster.roll.max_torque / caster.radius for caster in robot.casters) * lengths
     drag = force * lengths / (_CRUISE * robot.top_speed)

@@ -135,7 +135,7 @@ def _liveliest(recording: Recording, robot: Robot) -> Recording:
     """The part of a long recording in which the robot moves most."""
     if len(recording.pose) <= _MOST_ROWS:
         return recording
-    reach = max(math.hypot(caster.x, caster.y) for caster in robot.casters)
+    reach = robot.pivot_reach
     steps = np.abs(np.diff(recording.steering, axis=0)).sum(axis=1) + np.abs(
         np.diff(recording.pose, axis=0)
     ) @ np.array([1.0 / reach, 1.0 / reach, 1.0])

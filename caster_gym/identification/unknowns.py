@@ -10,8 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from caster_gym.configuration import did_you_mean, parse
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters, with_load
 from caster_gym.mechanics.scalars import Scalar
@@ -244,18 +242,13 @@ def _of_caster(caster: Caster, name: str) -> float:
     return float(getattr(getattr(caster, joint), kind) if kind else getattr(caster, name))
 
 
-def _reach(robot: Robot) -> float:
-    """Distance of the farthest pivot from C. [m]"""
-    return max(float(np.hypot(caster.x, caster.y)) for caster in robot.casters)
-
-
 def _scale(robot: Robot, name: str) -> float:
     caster = robot.casters[caster_of(name) or 0]
     roll, steer = caster.roll, caster.steer
     return {
         "payload_mass": 0.1 * robot.platform.mass,
-        "payload_x": 0.5 * _reach(robot),
-        "payload_y": 0.5 * _reach(robot),
+        "payload_x": 0.5 * robot.pivot_reach,
+        "payload_y": 0.5 * robot.pivot_reach,
         "payload_inertia": 0.5 * robot.platform.inertia,
         "roll_viscous": roll.max_torque / roll.max_speed,
         "roll_coulomb": 0.1 * roll.max_torque,
@@ -272,7 +265,7 @@ def _scale(robot: Robot, name: str) -> float:
         "heading_zero": 0.2,
         "vx_bias": 0.1 * robot.top_speed,
         "vy_bias": 0.1 * robot.top_speed,
-        "yaw_rate_bias": 0.1 * robot.top_speed / _reach(robot),
+        "yaw_rate_bias": 0.1 * robot.top_speed / robot.pivot_reach,
     }[kind_of(name)]
 
 

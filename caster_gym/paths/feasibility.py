@@ -171,8 +171,7 @@ def _complaint(hardest: MotorUse, k: int, robot: Robot) -> str:
     if hardest.joint[k] == 2 * robot.caster_count:
         return f"needs {torque:.2g} N {when} where the driven joints, {', '.join(robot.driven)}, cannot push"
     joint = robot.joints[hardest.joint[k]]
-    caster = robot.casters[hardest.joint[k] // 2]
-    top = (caster.roll if joint.startswith("roll") else caster.steer).max_speed
+    top = robot.motors[hardest.joint[k]].max_speed
     if abs(hardest.speed[k]) >= top:
         return f"turns the motor of {joint} at {abs(hardest.speed[k]):.3g} rad/s {when}, beyond its {top:g} rad/s"
     return f"asks {torque:.2g} N m of {joint} {when}, where its motor has {hardest.left[k]:.2g} N m left"

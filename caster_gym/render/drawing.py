@@ -9,7 +9,7 @@ from caster_gym.envs.scene import Scene
 from caster_gym.render import palette
 from caster_gym.render.canvas import Canvas, rounded_rectangle
 from caster_gym.render.history import IMPACT_LIFE, History, Impact
-from caster_gym.render.view import View, reach
+from caster_gym.render.view import View
 from caster_gym.robot import Caster, Footprint, Robot
 
 WHEEL_WIDTH = 0.62  # of its radius; the robot file knows none
@@ -36,14 +36,14 @@ def draw_reference(canvas: Canvas, view: View, scene: Scene, unit: float) -> Non
     """The outline of the pose that is to be reached."""
     outline = view.pixels(_to_world(_outline(scene.robot.platform.footprint), scene.reference))
     canvas.line(_closed(outline), 1.2 * unit, palette.GHOST)
-    size = reach(scene.robot)
+    size = scene.robot.reach
     nose = view.pixels(_to_world(np.array([(0.0, 0.0), (size, 0.0)]), scene.reference))
     canvas.line(nose, 1.2 * unit, palette.GHOST)
 
 
 def draw_robot(canvas: Canvas, view: View, scene: Scene, unit: float) -> None:
     """Outline with its front, casters as they are steered, slip and forces of the floor on the wheels, and C."""
-    size = reach(scene.robot) * view.scale
+    size = scene.robot.reach * view.scale
     colour = palette.FAILED if scene.failed else palette.BODY
     body = _outline(scene.robot.platform.footprint)
     outline = view.pixels(_to_world(body, scene.pose))
@@ -71,23 +71,23 @@ def draw_impact(canvas: Canvas, view: View, scene: Scene, impact: Impact, unit: 
     age = (scene.time - impact.time) / IMPACT_LIFE
     fading = (1.0 - age) ** 1.5
     centre = view.pixels(impact.point)
-    size = max(reach(scene.robot) * view.scale, 14.0 * unit)
+    size = max(scene.robot.reach * view.scale, 14.0 * unit)
     inner, outer = size * (0.12 + 0.5 * age), size * (0.3 + 0.65 * age)
     for angle in np.arange(12) * (math.pi / 6.0):
         ray = np.array([math.cos(angle), math.sin(angle)])
         canvas.line([centre + inner * ray, centre + outer * ray], 2.0 * unit, palette.IMPACT, fading)
-    impulse = impact.impulse * reach(scene.robot) / (total_mass(scene.robot) * SHOWN_SPEED)
+    impulse = impact.impulse * scene.robot.reach / (total_mass(scene.robot) * SHOWN_SPEED)
     canvas.arrow(centre, view.pixels(impact.point + _bounded(impulse, scene.robot)), 3.0 * unit, palette.IMPACT, fading)
 
 
 def force_scale(robot: Robot) -> float:
     """Length at which forces are drawn. [m/N]"""
-    return reach(robot) * len(robot.casters) / (total_mass(robot) * SHOWN_ACCELERATION)
+    return robot.reach * len(robot.casters) / (total_mass(robot) * SHOWN_ACCELERATION)
 
 
 def slip_scale(robot: Robot) -> float:
     """Length at which speeds of slip are drawn. [s]"""
-    return reach(robot) / SHOWN_SLIP
+    return robot.reach / SHOWN_SLIP
 
 
 def total_mass(robot: Robot) -> float:
@@ -128,7 +128,7 @@ def _arrows(scene: Scene, vectors: Array, scale: float) -> list[tuple[Array, Arr
 def _bounded(arrow: Array, robot: Robot) -> Array:
     """An arrow [m] no longer than the longest."""
     length = float(np.hypot(*arrow))
-    longest = LONGEST_ARROW * reach(robot)
+    longest = LONGEST_ARROW * robot.reach
     return arrow if length <= longest else arrow * (longest / length)
 
 

@@ -11,7 +11,7 @@ from caster_gym.render.canvas import Canvas
 from caster_gym.render.drawing import draw_motion, force_scale
 from caster_gym.render.floor import BACKING, draw_obstacles, draw_patches
 from caster_gym.render.history import History
-from caster_gym.render.view import Area, around, reach, round_length
+from caster_gym.render.view import Area, around, round_length
 
 SPAN = 10.0  # [s] of the chart of errors
 LOWEST, HIGHEST = -4, 0  # powers of ten [m] at the ends of its axis
@@ -39,7 +39,7 @@ def draw_panel(canvas: Canvas, area: Area, scene: Scene, history: History, unit:
 
 def draw_close_up(canvas: Canvas, area: Area, scene: Scene, history: History, unit: float) -> None:
     """The robot large enough to see its casters and the forces on its wheels."""
-    view = around(scene.pose[:2], CLOSE * reach(scene.robot), area)
+    view = around(scene.pose[:2], CLOSE * scene.robot.reach, area)
     canvas.clip(area)
     canvas.fill(palette.GROUND)
     draw_patches(canvas, view, scene, unit)
@@ -90,10 +90,9 @@ def draw_torques(canvas: Canvas, area: Area, scene: Scene, unit: float) -> None:
     _right(canvas, "rolling", (right - 58.0 * unit, title), 17.0 * unit, palette.BODY)
     plot = Area(area.left, area.top + 16.0 * unit, area.width, area.height - 16.0 * unit)
     middle, half = plot.centre[1], 0.5 * plot.height
-    motors = [motor for caster in scene.robot.casters for motor in (caster.roll, caster.steer)]
     slot = plot.width / len(scene.robot.casters)
     bar = min(0.34 * slot, 30.0 * unit)
-    for i, (motor, torque) in enumerate(zip(motors, scene.torque, strict=True)):
+    for i, (motor, torque) in enumerate(zip(scene.robot.motors, scene.torque, strict=True)):
         left = plot.left + (i // 2 + 0.5) * slot + (i % 2 - 1) * (bar + unit) + unit
         canvas.rectangle(Area(left, plot.top, bar, plot.height), palette.GROUND)
         height = float(np.clip(torque / motor.max_torque, -1.0, 1.0)) * half

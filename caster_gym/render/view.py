@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
-from caster_gym.robot import Robot
 
 NEAR = 0.25  # of what is shown anyway: half-planes not farther off than that are shown too
 BEHIND = 0.04  # how much of them is
@@ -83,24 +82,13 @@ def around(centre: ArrayLike, across: float, area: Area) -> View:
     return fitted(middle - 0.5 * across, middle + 0.5 * across, area)
 
 
-def reach(robot: Robot) -> float:
-    """Greatest distance of the outline and of the wheels from C, however they are steered. [m]"""
-    footprint = robot.platform.footprint
-    outline = footprint.disc or max(math.hypot(x, y) for x, y in footprint.polygon or ())
-    wheels = [
-        math.hypot(caster.x, caster.y) + math.hypot(caster.trail, caster.offset) + caster.radius
-        for caster in robot.casters
-    ]
-    return max(outline, *wheels)
-
-
 def extent(scene: Scene) -> tuple[Array, Array]:
     """Lower and upper corner of what a picture of the whole scene should show. [m]
 
     That is the path, as much of its corridor as helps to see it, all obstacles that end somewhere, and the edges of
     half-planes that are near to all this.
     """
-    size = reach(scene.robot)
+    size = scene.robot.reach
     low, high = scene.path.min(axis=0), scene.path.max(axis=0)
     margin = max(1.2 * size, min(scene.corridor, 0.15 * float((high - low).max()) + 2.0 * size))
     low, high = low - margin, high + margin

@@ -14,10 +14,9 @@ class InnerLoop(Runtime):
         self._layout = place.engine.layout
         self._model = Model(robot)
         self._gain = -np.expm1(-bandwidth * place.period) / place.period  # [1/s]
-        self._driven = [robot.joints.index(joint) for joint in robot.driven]
-        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
-        self._max_torque = np.array([motor.max_torque for motor in motors])[self._driven]
-        self._max_speed = np.array([motor.max_speed for motor in motors])[self._driven]
+        self._driven = robot.driven_indices
+        self._max_torque = robot.max_torques[self._driven]
+        self._max_speed = robot.max_speeds[self._driven]
         self._gears = np.array([caster.gear for caster in robot.casters])
         self._steering = np.zeros((place.count, robot.caster_count))
         self._twist = np.zeros((place.count, 3))

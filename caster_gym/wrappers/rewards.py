@@ -203,10 +203,9 @@ class _OfTorques(RewardRuntime):
     def __init__(self, name: str, weight: float, place: Place) -> None:
         super().__init__(name)
         robot = place.engine.robot
-        motors = [motor for caster in robot.casters for motor in (caster.roll, caster.steer)]
         self._weight = weight
-        self._driven = [robot.joints.index(joint) for joint in robot.driven]
-        self._limits = np.array([motors[i].max_torque for i in self._driven])
+        self._driven = robot.driven_indices
+        self._limits = robot.max_torques[self._driven]
 
     def _shares(self, quantities: Quantities) -> Array:
         shares: Array = quantities("torque")[:, self._driven] / self._limits

@@ -43,8 +43,7 @@ class Lack(NamedTuple):
 def lacks(path: AnyPath, robot: Robot, models: Sequence[KnownModel], period: float) -> list[list[Lack]]:
     """For each model, what it lacks along each trajectory of a path, casters trailing, a sample every period [s]."""
     coarse = np.stack([one.samples for one in path.trajectories(period)])
-    reach = max(np.hypot(caster.x, caster.y) for caster in robot.casters)
-    fastest = (np.hypot(coarse[..., 4], coarse[..., 5]) + reach * np.abs(coarse[..., 6])).max()
+    fastest = (np.hypot(coarse[..., 4], coarse[..., 5]) + robot.pivot_reach * np.abs(coarse[..., 6])).max()
     parts = int(np.ceil(fastest * period / (_STEP * min(caster.trail for caster in robot.casters))))
     fine = np.stack([one.samples for one in path.trajectories(period / parts)])
     steering = trailing_steering(fine, period / parts, robot)[:, ::parts]

@@ -4,6 +4,8 @@ from itertools import combinations
 from math import atan2, hypot, pi
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 Corners: TypeAlias = tuple[tuple[float, float], ...]
 
 _LEAST_TURN = 1e-9  # [rad] at a corner
@@ -15,6 +17,11 @@ class Outline(NamedTuple):
     faces: tuple[tuple[float, float, float], ...]  # outward normal n_x, n_y and its offset: n · p = offset on the face
     corners: Corners  # [m]
     radius: float  # [m]
+
+    @property
+    def reach(self) -> float:
+        """Distance of the farthest point from the origin. [m]"""
+        return float(np.hypot(*np.asarray(self.corners).T).max()) + self.radius
 
 
 def convex(corners: Corners) -> Outline:
