@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from caster_gym.report.page import Check, Table
 from caster_gym.robot import Robot
 from papers.notation import lengths_of
+from papers.page import Check, Table
 from papers.printed_jacobians import Printed
 
 ROUNDING = 1e-12  # [-] of the greatest entry: a few dozen roundings of 1e-16

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from caster_gym.configuration import did_you_mean
-from caster_gym.report.page import Section, differences_page, printed_checks, unexplained, write_page
 from caster_gym.report.provenance import write_provenance
 from caster_gym.report.run_folder import MARK, check_free, replace_file, staged
+from papers.page import Section, differences_page, printed_checks, unexplained, write_page
 
 
 class Paper(NamedTuple):

@@ -13,6 +13,7 @@ import numpy as np
 
 from caster_gym import Model, Robot
 from caster_gym.engines.time_step import longest_time_step, substeps_for
+from caster_gym.report.tables import markdown_table
 from scripts.mujoco_robot import joint_indices, placed
 
 LOAD = 0.5  # [-] of the torque at which the joints break away
@@ -58,8 +59,8 @@ def creep_table(creeps: list[Creep]) -> str:
     heads = ["robot", "`coulomb` [N m]"]
     heads += [f"creep at {speed:g} rad/s [mm] (substeps)" for speed in SPEEDS]
     heads.append(f"MuJoCo at {1e3 * PEER_STEP:g} ms [mm]")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for one in creeps:
         ours = [f"{1e3 * way:.2g} ({count})" for way, count in zip(one.ways, one.substeps, strict=True)]
-        lines.append(f"| {one.robot} | {one.coulomb:g} | {' | '.join(ours)} | {1e3 * one.peer:.2g} |")
-    return "\n".join(lines)
+        rows.append((one.robot, f"{one.coulomb:g}", *ours, f"{1e3 * one.peer:.2g}"))
+    return markdown_table(heads, rows)

@@ -5,13 +5,8 @@ MuJoCo's wheels slip where the friction of its floor does not suffice.
 """
 
 import argparse
-import csv
 import math
-import platform
-import shlex
-import sys
 from collections import Counter
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +19,10 @@ from caster_gym import Model, Robot, load_robot
 from caster_gym.export.mjcf import mjcf
 from caster_gym.mechanics.ground import CONTACT_TIME, impact_traction
 from caster_gym.mechanics.parameters import robot_parameters
-from scripts.mujoco_peer import paragraph, spread
+from caster_gym.report.pages import join_parts, paragraph
+from caster_gym.report.provenance import command_line, versions_in_words
+from caster_gym.report.tables import markdown_table, write_csv
+from scripts.mujoco_peer import spread
 from scripts.mujoco_robot import joint_indices
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
@@ -151,11 +149,7 @@ def before_wall(robot: Robot, steering: NDArray[np.float64], friction: float, st
 
 def write_table(file: Path, impacts: list[Impact]) -> None:
     """A line for each impact."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(HEADS)
-        for one in impacts:
-            table.writerow([one.robot, one.draw, *(f"{number:.4g}" for number in one[2:])])
+    write_csv(file, HEADS, ([one.robot, one.draw, *(f"{number:.4g}" for number in one[2:])] for one in impacts))
 
 
 def impact_table(impacts: list[Impact]) -> str:
@@ -169,7 +163,7 @@ def impact_table(impacts: list[Impact]) -> str:
         "MuJoCo [m/s]",
         "`impact_traction`",
     )
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for name in dict.fromkeys(one.robot for one in impacts):
         mine = [one for one in impacts if one.robot == name]
         columns = [
@@ -180,13 +174,12 @@ def impact_table(impacts: list[Impact]) -> str:
             [one.peer_sideways for one in mine],
             [one.traction for one in mine],
         ]
-        lines.append(f"| {' | '.join((name, *(spread(column) for column in columns)))} |")
-    return "\n".join(lines)
+        rows.append((name, *map(spread, columns)))
+    return markdown_table(heads, rows)
 
 
 def page(impacts: list[Impact], command: str) -> str:
     """The comparison as Markdown."""
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "mujoco", "numpy"))
     draws = max(Counter(one.robot for one in impacts).values())
     parts = [
         "# Impacts that the floor cannot hold",
@@ -207,9 +200,9 @@ def page(impacts: list[Impact], command: str) -> str:
             without the floor. On a floor of friction 1000, MuJoCo's impulses are ours (`tests/test_impact_peer.py`)."""
         ),
         f"- Command: `{command}`\n- MuJoCo's time step: {1e3 * STEP:g} ms\n"
-        f"- Versions: Python {platform.python_version()}, {libraries}\n",
+        f"- Versions: {versions_in_words('caster_gym', 'mujoco', 'numpy')}",
     ]
-    return "\n\n".join(parts)
+    return join_parts(parts)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -222,7 +215,7 @@ def main(arguments: list[str] | None = None) -> None:
     impacts = [compare(load_robot(name), draw) for name in chosen.robots for draw in range(chosen.draws)]
     chosen.out.mkdir(parents=True, exist_ok=True)
     write_table(chosen.out / "impacts.csv", impacts)
-    command = shlex.join(["python", "-m", "scripts.impact_peer", *(sys.argv[1:] if arguments is None else arguments)])
+    command = command_line("scripts.impact_peer", arguments)
     (chosen.out / "impacts.md").write_text(page(impacts, command), encoding="utf-8")
 
 

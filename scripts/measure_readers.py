@@ -15,7 +15,8 @@ from pathlib import Path
 from tqdm import tqdm
 
 from caster_gym.export.mjcf import mjcf
-from caster_gym.report.page import markdown_table
+from caster_gym.report.pages import between_marks
+from caster_gym.report.tables import markdown_table
 from caster_gym.robot import Robot, load_robot
 from scripts.readers.facts import FACTS, READERS
 
@@ -57,12 +58,6 @@ def table(answers: dict[str, dict[str, str]]) -> str:
     return markdown_table(("", *answers), [(fact, *(facts[fact] for facts in answers.values())) for fact in FACTS])
 
 
-def put(page: str, text: str) -> str:
-    """The page with the text between its markers."""
-    before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}"
-
-
 def main() -> None:
     """Ask every reader and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -77,7 +72,7 @@ def main() -> None:
         for file, robot in zip(files, (single(), load_robot("tidybot2")), strict=True):
             file.write_text(mjcf(robot, STEP), encoding="utf-8")
         answers = {reader: ask(reader, folder, files) for reader in tqdm(READERS, unit="reader")}
-    arguments.out.write_text(put(page, table(answers)), encoding="utf-8")
+    arguments.out.write_text(between_marks(page, BEGIN, END, f"\n{table(answers)}\n"), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -5,17 +5,16 @@ compiling from nothing.
 """
 
 import argparse
-import csv
 import os
-import shlex
-import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from caster_gym import Robot, load_robot
 from caster_gym.engines.native.threads import get_threads
+from caster_gym.report.provenance import command_line
 from caster_gym.report.run_folder import check_can_be_made
+from caster_gym.report.tables import write_csv
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import draw_growth, growth_rows
 from scripts.speed_limits import operations_of_a_step
@@ -83,12 +82,8 @@ def torch_rows(robot: Robot, name: str, cores: int, seconds: float) -> list[Row]
 
 def write_turns(file: Path, measured: Values) -> None:
     """Every value, a line each."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(["row", "turn", "value"])
-        table.writerows(
-            [key, turn, f"{value:.6g}"] for key, values in measured.items() for turn, value in enumerate(values)
-        )
+    rows = ((key, turn, f"{value:.6g}") for key, values in measured.items() for turn, value in enumerate(values))
+    write_csv(file, ("row", "turn", "value"), rows)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -110,7 +105,7 @@ def main(arguments: list[str] | None = None) -> None:
     growth = growth_rows(robot, chosen.robot, cores, GROWTH * seconds, chosen.quick)
     accuracy = measure_accuracy(robot)
     measured = run([*(row for _, _, rows in parts for row in rows), *growth], turns)
-    command = shlex.join(["python", "-m", "scripts.measure_speed", *(sys.argv[1:] if arguments is None else arguments)])
+    command = command_line("scripts.measure_speed", arguments)
     occasion = Occasion(command, turns, seconds, cores, (load, os.getloadavg()[0]), chosen.quick)
     text = page(parts, measured, accuracy, robot.name, operations_of_a_step(robot), folder.name, occasion)
     if chosen.out is None:

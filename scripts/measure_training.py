@@ -10,8 +10,6 @@ it.
 import argparse
 import os
 import resource
-import shlex
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -45,6 +43,7 @@ from caster_gym.agents.learning.shac import ShortHorizon, learn_through_simulato
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.engines.native.threads import set_threads
+from caster_gym.report.provenance import command_line
 from caster_gym.report.run_folder import check_can_be_made
 from caster_gym.shipped_files import read_settings
 from scripts.speed_timing import RATE, Row, middle, run
@@ -303,8 +302,7 @@ def main(arguments: list[str] | None = None) -> None:
         courses = [train_timed(name, task, one, seed) for seed in chosen.seeds for name, one in agents.items()]
         rates = {name: (one, rate_on_tensors(task, one)) for name, one in on_tensors.items()}
         beside = beside_others(task, ppo)
-    given = sys.argv[1:] if arguments is None else arguments
-    command = shlex.join(["python", "-m", "scripts.measure_training", *given])
+    command = command_line("scripts.measure_training", arguments)
     occasion = Occasion(command, chosen.turns, chosen.goal, (load, os.getloadavg()[0]))
     write_page(chosen.out, Results(agents, measured, courses, costs, rates, beside), occasion)
     print(chosen.out)

@@ -7,9 +7,7 @@ measured against MuJoCo, on pages of their own.
 
 import argparse
 import math
-import platform
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,6 +17,8 @@ from caster_gym import Model, Robot, load_robot
 from caster_gym.arrays import Array
 from caster_gym.mechanics.ground import CONTACT_TIME, impact_traction, tilt, wheel_loads
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
+from caster_gym.report.provenance import versions_in_words
+from caster_gym.report.tables import markdown_table
 
 ROBOTS = ("chung2008", "tidybot2", "xr4000")
 DIRECTIONS = 64  # in which a robot drives off
@@ -223,10 +223,7 @@ def step_error(robot: Robot) -> float:
 def page(found: list[Row], robots: Sequence[Robot], command: str) -> str:
     """The page as Markdown."""
     heads = ["what", *(robot.name for robot in robots), "taken in by"]
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
-    lines += [f"| {' | '.join((one.what, *one.sizes, one.option))} |" for one in found]
-    table = "\n".join(lines)
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "numpy"))
+    table = markdown_table(heads, [(one.what, *one.sizes, one.option) for one in found])
     return f"""# How true the model is
 
 The equations assume rigid bodies on a level floor, on which every wheel rolls without slip. Where that holds, they are
@@ -249,7 +246,7 @@ have no spin that would tilt the robot. Sensors are exact unless [features](wrap
 - [Slip](truth/slip.md): the plant whose wheels may slip (`floor`), beside MuJoCo's wheels on the same floor.
 
 - Command: `{command}`
-- Versions: Python {platform.python_version()}, {libraries}
+- Versions: {versions_in_words("caster_gym", "numpy")}
 """
 
 

@@ -5,13 +5,8 @@ table and a figure.
 """
 
 import argparse
-import csv
-import platform
-import shlex
 import sys
-import textwrap
 from collections import Counter
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +16,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from caster_gym import Robot, load_robot
-from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
+from caster_gym.report.pages import join_parts, paragraph
+from caster_gym.report.provenance import command_line, versions_in_words
+from caster_gym.report.tables import markdown_table, write_csv
 from scripts.dry_friction import LOAD, PERIOD, SECONDS, SPEEDS, Creep, creep, creep_table
 from scripts.mujoco_robot import (
     DURATION,
@@ -85,12 +83,12 @@ def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float
 
 def write_table(file: Path, comparisons: list[Comparison]) -> None:
     """A line for each robot, draw and time step."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(["robot", "draw", "path_m", "mujoco_step_s", "from_exact_m", "from_without_D1_m"])
-        for one in comparisons:
-            for step, exact, incomplete in zip(STEPS, one.from_exact, one.from_incomplete, strict=True):
-                table.writerow([one.robot, one.draw, f"{one.path:.6g}", step, f"{exact:.6g}", f"{incomplete:.6g}"])
+    rows = [
+        (one.robot, one.draw, f"{one.path:.6g}", step, f"{exact:.6g}", f"{incomplete:.6g}")
+        for one in comparisons
+        for step, exact, incomplete in zip(STEPS, one.from_exact, one.from_incomplete, strict=True)
+    ]
+    write_csv(file, ("robot", "draw", "path_m", "mujoco_step_s", "from_exact_m", "from_without_D1_m"), rows)
 
 
 def draw_convergence(file: Path, comparisons: list[Comparison]) -> None:
@@ -115,9 +113,8 @@ def draw_convergence(file: Path, comparisons: list[Comparison]) -> None:
         axis.set_xticks(steps, [f"{step:g}" for step in steps])
         axis.minorticks_off()
     figure.axes[0].set_ylabel(f"distance of the ends after {DURATION:g} s [mm]")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    figure.savefig(file, dpi=150)
+    legend_below(figure, figure.axes[0], 3, frameon=False)
+    figure.savefig(file)
 
 
 def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> str:
@@ -133,7 +130,7 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
         "a half step leaves",
         f"off the model without (D1) at {fine:g} ms [mm]",
     )
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for name in dict.fromkeys(one.robot for one in comparisons):
         mine = [one for one in comparisons if one.robot == name]
         exact = 1e3 * np.array([one.from_exact for one in mine])
@@ -147,10 +144,9 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
             f"{np.median(exact[:, -1] / exact[:, -2]):.3f}",
             spread([1e3 * one.from_incomplete[-1] for one in mine]),
         )
-        lines.append(f"| {' | '.join(cells)} |")
+        rows.append(cells)
     closer = sum(one.from_exact[-1] < 0.5 * one.from_incomplete[-1] for one in comparisons)
     draws = max(Counter(one.robot for one in comparisons).values())
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "mujoco", "numpy"))
     parts = [
         "# Truth by somebody else's code: MuJoCo's motion",
         paragraph(
@@ -166,7 +162,7 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
             no motor outruns its top speed. Compared is where the platform ends. Dry friction in the joints is left out,
             since MuJoCo's jumps at rest where ours passes smoothly: see below."""
         ),
-        "\n".join(lines),
+        markdown_table(heads, rows),
         "Medians over the drives, least and greatest in brackets; [all of them](convergence.csv).",
         paragraph(
             f"""As its step goes to zero, MuJoCo ends where the exact model ends: each half step leaves half of the
@@ -183,9 +179,9 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
         ),
         *dry_friction(creeps),
         f"- Command: `{command}`\n- Ours: RK4 at {1e3 * OUR_STEP:g} ms\n"
-        f"- Versions: Python {platform.python_version()}, {libraries}\n",
+        f"- Versions: {versions_in_words('caster_gym', 'mujoco', 'numpy')}",
     ]
-    return "\n\n".join(parts)
+    return join_parts(parts)
 
 
 def dry_friction(creeps: list[Creep]) -> list[str]:
@@ -211,11 +207,6 @@ def dry_friction(creeps: list[Creep]) -> list[str]:
     ]
 
 
-def paragraph(text: str) -> str:
-    """The text in lines of 120 characters."""
-    return textwrap.fill(" ".join(text.split()), 120, break_long_words=False, break_on_hyphens=False)
-
-
 def spread(values: Any) -> str:
     """Median, least and greatest."""
     low, middle, high = (
@@ -238,7 +229,7 @@ def main(arguments: list[str] | None = None) -> None:
     chosen.out.mkdir(parents=True, exist_ok=True)
     write_table(chosen.out / "convergence.csv", comparisons)
     draw_convergence(chosen.out / "convergence.png", comparisons)
-    command = shlex.join(["python", "-m", "scripts.mujoco_peer", *(sys.argv[1:] if arguments is None else arguments)])
+    command = command_line("scripts.mujoco_peer", arguments)
     (chosen.out / "mujoco.md").write_text(page(comparisons, creeps, command), encoding="utf-8")
 
 

@@ -1,9 +1,10 @@
 """Put the results of a comparison where readers see them: docs/benchmark/NAME/ and the table NAME in README.md."""
 
 import argparse
-import re
 import shutil
 from pathlib import Path
+
+from caster_gym.report.pages import between_marks
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = ("table.md", "summary.csv", "run.yaml", "overview.png")  # and all other figures
@@ -20,12 +21,8 @@ def publish(run: Path, name: str) -> None:
         shutil.copyfile(file, target / file.name)
     readme = ROOT / "README.md"
     begin, end = f"<!-- table {name}: begin -->\n", f"<!-- table {name}: end -->"
-    between = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
     table = (run / "table.md").read_text(encoding="utf-8")
-    changed, count = between.subn(lambda _: begin + table + end, readme.read_text(encoding="utf-8"))
-    if count != 1:
-        raise SystemExit(f"README.md must hold {begin.strip()} and {end} once")
-    readme.write_text(changed, encoding="utf-8")
+    readme.write_text(between_marks(readme.read_text(encoding="utf-8"), begin, end, table), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,12 +6,7 @@ cone is the other side.
 """
 
 import argparse
-import csv
-import platform
-import shlex
-import sys
 import time
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,8 +24,11 @@ from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import pairs
 from caster_gym.mechanics.slip import rolling_state, slip_step
-from caster_gym.report.drawing import COLOURS, new_figure
-from scripts.mujoco_peer import paragraph, spread
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
+from caster_gym.report.pages import join_parts, paragraph
+from caster_gym.report.provenance import command_line, versions_in_words
+from caster_gym.report.tables import markdown_table, write_csv
+from scripts.mujoco_peer import spread
 from scripts.mujoco_robot import joint_indices, motor_torques, without_dry_friction
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
@@ -275,17 +273,16 @@ def on_wheels(scene: Scenario) -> Array:
 
 def write_table(file: Path, comparisons: list[Comparison]) -> None:
     """A line for each robot, draw, scenario and time step."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(["robot", "draw", "scenario", "side", "step_s", "from_exact_m", "measure"])
-        for one in comparisons:
-            head = [one.scene.robot.name, one.scene.draw, one.scene.name]
-            for step, error in zip(OUR_STEPS[:-1], one.our_errors, strict=True):
-                table.writerow([*head, "caster_gym", step, f"{error:.3g}", ""])
-            table.writerow([*head, "caster_gym", OUR_STEPS[-1], 0, f"{measure(one.scene, one.ours):.4g}"])
-            for step, error in zip(STEPS, one.their_errors, strict=True):
-                last = f"{measure(one.scene, one.theirs):.4g}" if step == STEPS[-1] else ""
-                table.writerow([*head, "mujoco", step, f"{error:.3g}", last])
+    rows: list[tuple[object, ...]] = []
+    for one in comparisons:
+        head = one.scene.robot.name, one.scene.draw, one.scene.name
+        for step, error in zip(OUR_STEPS[:-1], one.our_errors, strict=True):
+            rows.append((*head, "caster_gym", step, f"{error:.3g}", ""))
+        rows.append((*head, "caster_gym", OUR_STEPS[-1], 0, f"{measure(one.scene, one.ours):.4g}"))
+        for step, error in zip(STEPS, one.their_errors, strict=True):
+            last = f"{measure(one.scene, one.theirs):.4g}" if step == STEPS[-1] else ""
+            rows.append((*head, "mujoco", step, f"{error:.3g}", last))
+    write_csv(file, ("robot", "draw", "scenario", "side", "step_s", "from_exact_m", "measure"), rows)
 
 
 def draw_courses(file: Path, comparisons: list[Comparison]) -> None:
@@ -298,9 +295,8 @@ def draw_courses(file: Path, comparisons: list[Comparison]) -> None:
         axis.set_title(one.scene.name)
         axis.set_xlabel("time [ms]")
     figure.axes[0].set_ylabel("slip of the wheel that slips most [m/s]")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-    figure.savefig(file, dpi=150)
+    legend_below(figure, figure.axes[0], 2, frameon=False)
+    figure.savefig(file)
 
 
 UNITS = {
@@ -315,7 +311,7 @@ UNITS = {
 def comparison_table(comparisons: list[Comparison]) -> str:
     """What both say, scenario by scenario, as Markdown."""
     heads = ("scenario", "measured", "robot", "ours", "MuJoCo", "ends apart [mm]", "at 5 ms ours is off [mm]")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for name, unit in UNITS.items():
         for robot in dict.fromkeys(one.scene.robot.name for one in comparisons):
             mine = [one for one in comparisons if (one.scene.robot.name, one.scene.name) == (robot, name)]
@@ -329,34 +325,28 @@ def comparison_table(comparisons: list[Comparison]) -> str:
                 spread([1e3 * one.their_errors[-1] for one in mine]),
                 spread([1e3 * one.our_errors[0] for one in mine]),
             )
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+            rows.append(cells)
+    return markdown_table(heads, rows)
 
 
 def rate_table(found: list[Rate], comparisons: list[Comparison]) -> str:
     """Errors of drifts beside simulated time, as Markdown."""
     heads = ("robot", "side", "step [ms]", "drift off by [mm]", "simulated s per s of a core", "ours is faster by")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for rate in found:
         mine = [one for one in comparisons if (one.scene.robot.name, one.scene.name) == (rate.robot, "drift")]
         error = np.median([one.our_errors[0] for one in mine])
-        lines.append(
-            f"| {rate.robot} | ours, batch | {1e3 * OUR_STEPS[0]:g} | {1e3 * error:.2g} | {rate.batch:,.0f} | |"
-        )
-        lines.append(
-            f"| {rate.robot} | ours, one robot | {1e3 * OUR_STEPS[0]:g} | {1e3 * error:.2g} | {rate.single:,.0f} | |"
-        )
+        for side, speed in (("ours, batch", rate.batch), ("ours, one robot", rate.single)):
+            rows.append((rate.robot, side, f"{1e3 * OUR_STEPS[0]:g}", f"{1e3 * error:.2g}", f"{speed:,.0f}", ""))
         for step, speed, errors in zip(STEPS, rate.peer, np.array([one.their_errors for one in mine]).T, strict=True):
-            lines.append(
-                f"| {rate.robot} | MuJoCo | {1e3 * step:g} | {1e3 * np.median(errors):.2g} | {speed:,.0f} | "
-                f"{rate.batch / speed:,.0f} (batch), {rate.single / speed:,.0f} (one) |"
-            )
-    return "\n".join(lines)
+            faster = f"{rate.batch / speed:,.0f} (batch), {rate.single / speed:,.0f} (one)"
+            error = np.median(errors)
+            rows.append((rate.robot, "MuJoCo", f"{1e3 * step:g}", f"{1e3 * error:.2g}", f"{speed:,.0f}", faster))
+    return markdown_table(heads, rows)
 
 
 def page(comparisons: list[Comparison], found: list[Rate], command: str) -> str:
     """The comparison as Markdown; picture and table lie beside it."""
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("caster_gym", "mujoco", "numpy"))
     parts = [
         "# A floor that wheels slip on",
         paragraph(
@@ -385,9 +375,9 @@ def page(comparisons: list[Comparison], found: list[Rate], command: str) -> str:
             ours at the shortest step, which for MuJoCo contains what its softer contacts do otherwise."""
         ),
         rate_table(found, comparisons),
-        f"- Command: `{command}`\n- Versions: Python {platform.python_version()}, {libraries}\n",
+        f"- Command: `{command}`\n- Versions: {versions_in_words('caster_gym', 'mujoco', 'numpy')}",
     ]
-    return "\n\n".join(parts)
+    return join_parts(parts)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -406,7 +396,7 @@ def main(arguments: list[str] | None = None) -> None:
     last = robots[-1].name
     shown = [one for one in comparisons if (one.scene.robot.name, one.scene.draw) == (last, 0)]
     draw_courses(chosen.out / "slip.png", shown)
-    command = shlex.join(["python", "-m", "scripts.slip_peer", *(sys.argv[1:] if arguments is None else arguments)])
+    command = command_line("scripts.slip_peer", arguments)
     (chosen.out / "slip.md").write_text(page(comparisons, found, command), encoding="utf-8")
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from caster_gym import Robot
 from caster_gym.arena import Arena
 from caster_gym.arena.arena import Pillar
-from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.figures import COLOURS, new_figure
+from caster_gym.report.tables import markdown_table
 from scripts.speed_robots import COURSES, FOLLOW, bare_equations, batch, on
 from scripts.speed_timing import RATE, Row, Values, middle
 
@@ -113,16 +114,15 @@ def draw_growth(file: Path, measured: Values, cores: int) -> None:
     casters.autoscale_view()
     for axis in (casters, obstacles):
         axis.set_ylabel("time of a robot's step on a core [ns]")
-    figure.savefig(file, dpi=150)
+    figure.savefig(file)
 
 
-def growth_table(measured: Values) -> list[str]:
+def growth_table(measured: Values) -> str:
     """Medians as Markdown, a line for each number of what grows."""
-    lines = ["| what grows | number | bare RK4, steps/s | environment, steps/s |", "|---|---|---|---|"]
+    rows = []
     for what in ("robots", "casters", "obstacles"):
         bare, env = line(measured, what, "bare"), line(measured, what, "env")
-        lines += [
-            f"| {what} | {count:,} | {middle(rates):,.3g} | {f'{middle(env[count]):,.3g}' if count in env else ''} |"
-            for count, rates in bare.items()
-        ]
-    return lines
+        for count, rates in bare.items():
+            whole = f"{middle(env[count]):,.3g}" if count in env else ""
+            rows.append((what, f"{count:,}", f"{middle(rates):,.3g}", whole))
+    return markdown_table(("what grows", "number", "bare RK4, steps/s", "environment, steps/s"), rows)

@@ -7,7 +7,7 @@ from caster_gym import Robot
 from caster_gym.mechanics.integration import rk4_step, unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs, register
-from scripts.mujoco_peer import paragraph
+from caster_gym.report.pages import paragraph
 from scripts.speed_accuracy import Accuracy
 from scripts.speed_growth import line
 from scripts.speed_peers import MUJOCO_STEP

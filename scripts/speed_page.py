@@ -2,12 +2,13 @@
 
 import os
 import platform
-from collections.abc import Iterable, Sequence
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from scripts.mujoco_peer import paragraph
+from caster_gym.report.pages import join_parts, paragraph
+from caster_gym.report.provenance import versions_in_words
+from caster_gym.report.tables import markdown_table
 from scripts.mujoco_robot import DURATION, STRONG
 from scripts.speed_accuracy import Accuracy
 from scripts.speed_growth import growth_table
@@ -119,18 +120,13 @@ def page(
             and right: time of one robot's step on a core, over its casters and over the pillars in its field. Bars: the
             middle half of the turns.*"""
         ),
-        "\n".join(growth_table(measured)),
+        growth_table(measured),
         "## What limits each engine",
         limits_text(measured, accuracy, operations),
         "## How it was measured",
         origin(occasion, folder),
     ]
-    return "\n\n".join(parts) + "\n"
-
-
-def table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """A table as Markdown."""
-    return "\n".join([f"| {' | '.join(cells)} |" for cells in (heads, ["---"] * len(heads), *lines)])
+    return join_parts(parts)
 
 
 def goals_table(rows: Sequence[Row], measured: Values, accuracy: Accuracy) -> str:
@@ -155,7 +151,7 @@ def goals_table(rows: Sequence[Row], measured: Values, accuracy: Accuracy) -> st
         for name, goal, values, unit in entries
         if values
     ]
-    return table(("what", "goal", "median", "middle half", ""), lines)
+    return markdown_table(("what", "goal", "median", "middle half", ""), lines)
 
 
 def verdict(goal: Goal, value: float) -> str:
@@ -170,7 +166,7 @@ def rows_table(rows: Sequence[Row], measured: Values) -> str:
         for row in rows
         if (values := measured.get(row.key))
     ]
-    return table(("what", "median", "middle half"), lines)
+    return markdown_table(("what", "median", "middle half"), lines)
 
 
 def ratios_table(measured: Values) -> str:
@@ -178,7 +174,7 @@ def ratios_table(measured: Values) -> str:
     lines = [
         (ratio.name, shown(middle(values)), spread(values)) for ratio in RATIOS if (values := ratio.values(measured))
     ]
-    return table(("what", "median", "middle half"), lines)
+    return markdown_table(("what", "median", "middle half"), lines)
 
 
 def accuracy_text(accuracy: Accuracy, robot: str) -> str:
@@ -196,12 +192,11 @@ def accuracy_text(accuracy: Accuracy, robot: str) -> str:
         {shown(float(over.min()))} times; its wheels slip by {slips:.2f} % of their way. That its limit is ours as its
         step goes to zero is shown in [mujoco.md](truth/mujoco.md)."""
     heads = ("position after the drive", "median error", "middle half", "greatest")
-    return f"{paragraph(text)}\n\n{table(heads, lines)}"
+    return f"{paragraph(text)}\n\n{markdown_table(heads, lines)}"
 
 
 def origin(occasion: Occasion, folder: str) -> str:
     """Command, machine and versions."""
-    versions = ", ".join(f"{library} {found(library)}" for library in LIBRARIES)
     return "\n".join(
         [
             f"- Command: `{occasion.command}`",
@@ -211,17 +206,9 @@ def origin(occasion: Occasion, folder: str) -> str:
             f"- Machine: {processor()}, {os.cpu_count()} cores, of which {occasion.cores} are used",
             f"- Load of the machine: {occasion.loads[0]:.1f} at the start, {occasion.loads[1]:.1f} at the end "
             "(of an idle one 0 at the start; at the end it is that of the measurement)",
-            f"- Versions: Python {platform.python_version()}, {versions}",
+            f"- Versions: {versions_in_words(*LIBRARIES)}",
         ]
     )
-
-
-def found(library: str) -> str:
-    """Its version."""
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def processor() -> str:

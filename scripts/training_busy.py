@@ -13,8 +13,8 @@ from tqdm import tqdm
 
 from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import limited_to
-from scripts.mujoco_peer import paragraph
-from scripts.speed_page import table
+from caster_gym.report.pages import paragraph
+from caster_gym.report.tables import markdown_table
 from scripts.speed_timing import RATE, middle, shown
 
 COUNTS = (1, 2)  # of threads
@@ -92,4 +92,4 @@ def section(beside: Beside) -> str:
         processor, since the two wait for each other; and other numbers come out, since sums depend on how they are
         shared out."""
     heads = ("threads", "training with PPO, by the clock", "processor time for a control period")
-    return "\n\n".join(["## Beside other processes", paragraph(text), table(heads, rows)])
+    return "\n\n".join(["## Beside other processes", paragraph(text), markdown_table(heads, rows)])

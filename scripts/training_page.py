@@ -1,6 +1,5 @@
 """The page of `scripts.measure_training`: tables, a figure, and what they say."""
 
-import csv
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,10 +7,11 @@ from typing import NamedTuple
 
 from caster_gym.agents.comparison.metrics import Verdict
 from caster_gym.agents.learning.agent_settings import LearnedSettings
-from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.figures import COLOURS, new_figure
+from caster_gym.report.pages import join_parts, paragraph
 from caster_gym.report.provenance import versions
-from scripts.mujoco_peer import paragraph
-from scripts.speed_page import processor, table
+from caster_gym.report.tables import markdown_table, write_csv
+from scripts.speed_page import processor
 from scripts.speed_timing import RATE, Ratio, Values, at_least, middle, shown, spread
 from scripts.training_busy import Beside, section
 
@@ -112,7 +112,7 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
                 robot that leaves its corridor counts with its error until then, so that errors of some 0.1 m are
                 those of policies that still fail.*"""
             ),
-            table(HEADS, _rows(results, occasion.goal)),
+            markdown_table(HEADS, _rows(results, occasion.goal)),
             *(_compilation(name, one, results, occasion.goal) for name, one in results.costs.items()),
         ]
     if any(one.trials for one in results.courses):
@@ -123,12 +123,14 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
                 shapes unlike any that it was trained on. Validation, on random paths alone, does not tell of
                 those."""
             ),
-            table(("learner", "paths", "failed episodes", "position RMSE of the others, median"), _trials(results)),
+            markdown_table(
+                ("learner", "paths", "failed episodes", "position RMSE of the others, median"), _trials(results)
+            ),
         ]
     parts += ["## What limits each learner", _limits(results)]
     parts += [section(results.beside)] if results.beside else []
     parts += ["## How it was measured", _origin(results, occasion, folder)]
-    return "\n\n".join(parts) + "\n"
+    return join_parts(parts)
 
 
 def _compared(results: Results, goal: str) -> str:
@@ -241,7 +243,7 @@ def _limits(results: Results) -> str:
             shapes drawn beforehand, it would hardly be faster; the goal, {SHARE.goal} % of that speed, is
             {reached}."""
         ),
-        table(("training with PPO", "median", "middle half"), rows),
+        markdown_table(("training with PPO", "median", "middle half"), rows),
     ]
     for name, costs in results.costs.items():
         whole = costs.forward + costs.backward + costs.critic
@@ -256,7 +258,7 @@ def _limits(results: Results) -> str:
                 f"""`{name}` is limited by how many kernels it launches: batches this small hardly keep one busy. A
                 window of {costs.periods:,} control periods takes, in milliseconds of the processor:"""
             ),
-            table(
+            markdown_table(
                 (name, "ms", "share"),
                 [(what, f"{1e3 * one:.1f}", f"{100.0 * one / whole:.0f} %") for what, one in pieces.items()],
             ),
@@ -304,13 +306,12 @@ def _origin(results: Results, occasion: Occasion, folder: str) -> str:
 
 def write_points(path: Path, courses: Sequence[Course]) -> None:
     """All validations."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("learner", "seed", "steps", "processor_seconds", "position_rmse", "failures"))
-        for one in courses:
-            for steps, seconds, verdict in one.points:
-                error = f"{verdict.position_rmse:.6g}"
-                writer.writerow((one.learner, one.seed, steps, f"{seconds:.2f}", error, verdict.failures))
+    rows = [
+        (one.learner, one.seed, steps, f"{seconds:.2f}", f"{verdict.position_rmse:.6g}", verdict.failures)
+        for one in courses
+        for steps, seconds, verdict in one.points
+    ]
+    write_csv(path, ("learner", "seed", "steps", "processor_seconds", "position_rmse", "failures"), rows)
 
 
 def draw(path: Path, courses: Sequence[Course], goal: float) -> None:
@@ -343,4 +344,4 @@ def draw(path: Path, courses: Sequence[Course], goal: float) -> None:
     right.text(
         *place, f"goal: {1e3 * goal:g} mm", transform=right.get_yaxis_transform(), color="0.25", fontsize="small"
     )
-    figure.savefig(path, dpi=130)
+    figure.savefig(path)

@@ -49,7 +49,7 @@ def test_the_table_of_motors_is_the_requirement_of_the_robot_file(report, folder
     with (folder / "motors.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     again = require(load_robot(folder / "robot.yaml"), report.settings, report.design.motions)
-    assert tuple(rows[0]) == COLUMNS
+    assert list(rows[0]) == list(COLUMNS)
     assert [row["joint"] for row in rows] == list(JOINTS)
     for row, motor in zip(rows, again.motors, strict=True):
         assert float(row["torque_Nm"]) == motor.torque

@@ -17,7 +17,6 @@ from caster_gym.identification.command import (
     number_words,
     page,
     read_identify,
-    robot_yaml,
     write_example,
     write_identification,
 )
@@ -128,8 +127,8 @@ def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
     assert "# motor_lag: 0 s; motors that follow at once need no wrapper" in at_once
 
 
-def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(found, short, tmp_path):
-    (tmp_path / "robot.yaml").write_text(robot_yaml(found, short), encoding="utf-8")
+def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(found, short, settings, tmp_path):
+    write_identification(found, short, settings, tmp_path)
     robot, original = load_robot(tmp_path / "robot.yaml"), load_robot("chung2008")
     assert robot == found.robot
     assert robot.platform.mass == pytest.approx(original.platform.mass + found.estimates[0])

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from caster_gym.agents.comparison.measuring import Printed, shown
 from caster_gym.agents.learning.training_run import Validation
 from caster_gym.envs.native.reference import Courses
 from caster_gym.envs.plan import Plan
-from caster_gym.render.palette import SERIES as COLOURS
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 OBSTACLE = "0.75"
 MOST_PATHS = 6
@@ -29,72 +30,55 @@ def write_figures(
     paths.png, errors.png, torques.png, learning.png and overview.png; speeds.png of paths that are followed at the
     robot's own pace.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
     colours = dict(zip(episodes, COLOURS * (1 + len(episodes) // len(COLOURS)), strict=False))
     chosen = _telling_episodes(next(iter(episodes.values())).names)
     own_pace = isinstance(plan.guide, Courses)
-    figures: dict[str, Any] = {}
+    curves = learning_curves(histories)
+    figures: dict[str, Figure] = {}
 
-    figure, places = _grid(len(chosen))
-    for axis, index in zip(places, chosen, strict=False):
-        draw_path(axis, episodes, index, colours, plan)
-    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    figures["paths"] = figure
+    for kind, draw in {"paths": draw_path, **({"speeds": draw_speeds} if own_pace else {})}.items():
+        figure = figures[kind] = new_figure(2, 3, (4.0, 4.0))
+        for axis, index in zip(figure.axes, chosen, strict=False):
+            draw(axis, episodes, index, colours, plan)
+        for axis in figure.axes[len(chosen) :]:
+            axis.set_visible(False)
+        legend_below(figure, figure.axes[0], 3)
 
-    if own_pace:
-        figure, places = _grid(len(chosen))
-        for axis, index in zip(places, chosen, strict=False):
-            draw_speeds(axis, episodes, index, colours, plan)
-        figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-        figures["speeds"] = figure
-
-    figure, (above, below) = plt.subplots(2, 1, figsize=(9, 7), sharex=True, layout="constrained")
+    figure = figures["errors"] = new_figure(2, 1, (9.0, 3.5), sharex=True)
+    above, below = figure.axes
     draw_errors(above, episodes, "position_error", 1e3, "position error [mm]", colours)
     draw_errors(below, episodes, "heading_error", 1e3, "heading error [mrad]", colours)
     below.set_xlabel("time [s]")
     above.legend(fontsize="small")
-    figures["errors"] = figure
 
-    figure, axes = plt.subplots(
-        len(episodes), 1, figsize=(9, 2.2 * len(episodes)), squeeze=False, sharex=True, layout="constrained"
-    )
-    for axis, (agent, series) in zip(axes[:, 0], episodes.items(), strict=True):
+    figure = figures["torques"] = new_figure(len(episodes), 1, (9.0, 2.2), sharex=True)
+    for axis, (agent, series) in zip(figure.axes, episodes.items(), strict=True):
         draw_torques(axis, series, chosen[-1])
         axis.set_title(f"{agent}, {series.names[chosen[-1]]}", fontsize="medium")
-    axes[-1, 0].set_xlabel("time [s]")
-    axes[0, 0].legend(fontsize="x-small", ncols=3)
-    figures["torques"] = figure
+    figure.axes[-1].set_xlabel("time [s]")
+    figure.axes[0].legend(fontsize="x-small", ncols=3)
 
-    curves = learning_curves(histories)
     if curves:
-        figure, axes = plt.subplots(1, len(curves), figsize=(7 * len(curves), 4.5), squeeze=False, layout="constrained")
-        for axis, (name, how) in zip(axes[0], curves.items(), strict=True):
+        figure = figures["learning"] = new_figure(1, len(curves), (7.0, 4.5))
+        for axis, (name, how) in zip(figure.axes, curves.items(), strict=True):
             draw_learning(axis, histories, name, how)
-        figures["learning"] = figure
 
-    figure, axes = plt.subplots(1, 3 if curves else 2, figsize=(16 if curves else 11, 4.6), layout="constrained")
-    draw_path(axes[0], episodes, chosen[-1], colours, plan)
+    figure = figures["overview"] = new_figure(1, 3 if curves else 2, (5.4, 4.6))
+    left, middle, *right = figure.axes
+    draw_path(left, episodes, chosen[-1], colours, plan)
     if own_pace:
-        draw_speeds(axes[1], episodes, chosen[-1], colours, plan)
+        draw_speeds(middle, episodes, chosen[-1], colours, plan)
     else:
-        draw_errors(axes[1], episodes, "position_error", 1e3, "position error [mm]", colours)
-        axes[1].set_xlabel("time [s]")
-        axes[1].set_title("all test episodes: median, 10 to 90 %", fontsize="medium")
-    axes[1].legend(fontsize="small")
-    for name, how in list(curves.items())[-1:]:
-        draw_learning(axes[2], histories, name, how)
-    figures["overview"] = figure
+        draw_errors(middle, episodes, "position_error", 1e3, "position error [mm]", colours)
+        middle.set_xlabel("time [s]")
+        middle.set_title("all test episodes: median, 10 to 90 %", fontsize="medium")
+    middle.legend(fontsize="small")
+    for axis, (name, how) in zip(right, list(curves.items())[-1:], strict=True):
+        draw_learning(axis, histories, name, how)
 
-    written = []
-    for name, figure in figures.items():
-        path = folder / f"{name}.png"
-        figure.savefig(path, dpi=110)
-        plt.close(figure)
-        written.append(path)
+    written = [folder / f"{name}.png" for name in figures]
+    for path, figure in zip(written, figures.values(), strict=True):
+        figure.savefig(path)
     return written
 
 
@@ -161,7 +145,6 @@ def draw_speeds(
     axis.set_title(next(iter(episodes.values())).names[index], fontsize="medium")
     axis.set_xlabel("progress [m]")
     axis.set_ylabel("speed along the path [m/s]")
-    axis.grid(alpha=0.3)
 
 
 def draw_errors(
@@ -177,7 +160,6 @@ def draw_errors(
         axis.plot(time, middle, color=colours[agent], label=agent)
     axis.set_yscale("log")
     axis.set_ylabel(label)
-    axis.grid(alpha=0.3)
 
 
 def draw_torques(axis: "Axes", series: Episodes, index: int) -> None:
@@ -189,7 +171,6 @@ def draw_torques(axis: "Axes", series: Episodes, index: int) -> None:
         colour, style = COLOURS[motor // 2 % len(COLOURS)], "-" if motor % 2 == 0 else ":"
         axis.plot(time, share[:, motor], style, color=colour, linewidth=1.0, label=f"{kind}_{motor // 2 + 1}")
     axis.set_ylabel("torque / limit")
-    axis.grid(alpha=0.3)
 
 
 def learning_curves(histories: Mapping[str, Sequence[Validation]]) -> dict[str, Printed]:
@@ -208,18 +189,7 @@ def draw_learning(axis: "Axes", histories: Mapping[str, Sequence[Validation]], n
     axis.set_yscale(how.scale)
     axis.set_xlabel("training time [s], one core for each seed")
     axis.set_ylabel(f"validation {how.label}")
-    axis.grid(alpha=0.3)
     axis.legend(fontsize="small")
-
-
-def _grid(used: int) -> tuple[Any, list["Axes"]]:
-    """A figure with a place for each path that is drawn."""
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(2, 3, figsize=(12, 8), layout="constrained")
-    for axis in axes.flat[used:]:
-        axis.set_visible(False)
-    return figure, list(axes.flat)
 
 
 def _telling_episodes(names: Sequence[str]) -> list[int]:

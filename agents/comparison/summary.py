@@ -1,6 +1,5 @@
 """From episodes to tables: means with bootstrap intervals, as CSV and as text to read."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +10,7 @@ from scipy.stats import bootstrap
 from caster_gym.agents.comparison.measuring import Counted, Printed, shown
 from caster_gym.agents.comparison.metrics import Metrics
 from caster_gym.arrays import Array
+from caster_gym.report.tables import markdown_table, write_csv
 
 RESAMPLES = 2000
 
@@ -81,10 +81,7 @@ def table(results: Sequence[Result], confidence: float) -> str:
         [how.label, *[_cell(values_of(g, name), how, confidence) for g in groups.values()]]
         for name, how in shown(type(results[0].metrics))
     ]
-    widths = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
-    lines = [[cell.ljust(width) for cell, width in zip(line, widths, strict=True)] for line in [head, *body]]
-    rule = ["-" * width for width in widths]
-    return "\n".join("| " + " | ".join(line) + " |" for line in [lines[0], rule, *lines[1:]])
+    return markdown_table(head, body, padded=True)
 
 
 def _cell(values: Array, how: Printed | Counted, confidence: float) -> str:
@@ -100,21 +97,19 @@ def _cell(values: Array, how: Printed | Counted, confidence: float) -> str:
 
 def write_episodes(path: Path, results: Sequence[Result]) -> None:
     """Every metric of every episode of every agent and seed, in SI units."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["agent", "seed", "episode", "path", *results[0].metrics._fields])
-        for result in results:
-            seed = "" if result.seed is None else result.seed
-            for i, name in enumerate(result.paths):
-                writer.writerow([result.agent, seed, i, name, *[float(values[i]) for values in result.metrics]])
+    rows = (
+        (result.agent, "" if result.seed is None else result.seed, i, name, *(float(v[i]) for v in result.metrics))
+        for result in results
+        for i, name in enumerate(result.paths)
+    )
+    write_csv(path, ("agent", "seed", "episode", "path", *results[0].metrics._fields), rows)
 
 
 def write_summary(path: Path, results: Sequence[Result], confidence: float) -> None:
     """The table's numbers for every metric, in SI units."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["agent", "seeds", "episodes", "metric", *Estimate._fields])
-        for agent, group in by_agent(results).items():
-            for metric in group[0].metrics._fields:
-                found = estimate(values_of(group, metric), confidence)
-                writer.writerow([agent, len(group), len(group[0].paths), metric, *found])
+    rows = (
+        (agent, len(group), len(group[0].paths), metric, *estimate(values_of(group, metric), confidence))
+        for agent, group in by_agent(results).items()
+        for metric in group[0].metrics._fields
+    )
+    write_csv(path, ("agent", "seeds", "episodes", "metric", *Estimate._fields), rows)

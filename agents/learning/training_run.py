@@ -1,6 +1,5 @@
 """A training run, whoever learns: the validations of its policies, and the folder in which they are kept."""
 
-import csv
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from caster_gym.agents.learning.agent_settings import LearnedSettings
 from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bundle
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.report.provenance import versions
+from caster_gym.report.tables import write_csv
 
 VALIDATION_SEED = 500
 STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
@@ -128,7 +128,5 @@ class Run:
         )
 
     def _write_history(self) -> None:
-        with (self.folder / "validation.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(self.history[0].numbers)
-            writer.writerows(result.numbers.values() for result in self.history)
+        rows = (result.numbers.values() for result in self.history)
+        write_csv(self.folder / "validation.csv", self.history[0].numbers, rows)

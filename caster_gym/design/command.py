@@ -1,12 +1,10 @@
 """The command `design`: the radius and trail that suit a target best, and the motors that it needs."""
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import field_validator
 
 from caster_gym.configuration import parse, read_yaml
@@ -15,24 +13,38 @@ from caster_gym.design.search import Design, DesignTarget, check_designable, opt
 from caster_gym.design.sizing import MotorRequirement, Requirement, require
 from caster_gym.design.target import driven_as
 from caster_gym.file_names import NameOrFile, from_working_folder, with_files_beside
+from caster_gym.report.pages import join_parts
 from caster_gym.report.provenance import write_provenance
+from caster_gym.report.robot_files import robot_yaml
 from caster_gym.report.run_folder import check_free, staged
+from caster_gym.report.tables import markdown_table, write_csv
 from caster_gym.robot import Robot, load_robot
 from caster_gym.shipped_files import find
 
-COLUMNS = (
-    "joint",
-    "torque_Nm",
-    "speed_rad_s",
-    "power_W",
-    "smallest_motor_torque_Nm",
-    "smallest_motor_speed_rad_s",
-    "file_torque_Nm",
-    "file_speed_rad_s",
-    "file_power_W",
+COLUMNS: dict[str, Callable[[MotorRequirement, MotorRequirement], object]] = {  # of a motor after and before
+    "joint": lambda after, _: after.joint,
+    "torque_Nm": lambda after, _: after.torque,
+    "speed_rad_s": lambda after, _: after.speed,
+    "power_W": lambda after, _: after.power,
+    "smallest_motor_torque_Nm": lambda after, _: after.standstill_torque,
+    "smallest_motor_speed_rad_s": lambda after, _: after.top_speed,
+    "file_torque_Nm": lambda after, _: after.has_torque,
+    "file_speed_rad_s": lambda after, _: after.has_speed,
+    "file_power_W": lambda after, _: after.has_power,
+    "use": lambda after, _: after.use,
+    "enough": lambda after, _: after.enough,
+    "use_before": lambda _, before: before.use,
+}
+MOTOR_HEADS = (
+    "motor",
+    "torque [N m]",
+    "speed [rad/s]",
+    "power [W]",
+    "smallest motor",
+    "in the file",
+    "before",
     "use",
     "enough",
-    "use_before",
 )
 OBJECTIVES = {
     "isotropy": "global isotropy (1 is best)",
@@ -111,12 +123,13 @@ def write_design(report: DesignReport, folder: Path) -> str:
     text = page(report)
     folder.mkdir(parents=True, exist_ok=True)
     write_design_figure(folder / "design.png", report.settings, report.design, report.after)
-    with (folder / "motors.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for motor, earlier in zip(report.after.motors, report.before.motors, strict=True):
-            writer.writerow(_row(motor, earlier))
-    (folder / "robot.yaml").write_text(robot_yaml(report), encoding="utf-8")
+    motors = list(zip(report.after.motors, report.before.motors, strict=True))
+    write_csv(folder / "motors.csv", COLUMNS, ([value(*motor) for value in COLUMNS.values()] for motor in motors))
+    remark = (
+        f"{report.original.name} with wheels of {1e3 * report.design.radius:.1f} mm radius and "
+        f"{1e3 * report.design.trail:.1f} mm trail, by `caster-gym design`; its motors are those of the original."
+    )
+    (folder / "robot.yaml").write_text(robot_yaml(report.design.robot, remark), encoding="utf-8")
     write_provenance(folder, settings=report.settings.model_dump(mode="json"))
     (folder / "design.md").write_text(text, encoding="utf-8")
     return text
@@ -134,56 +147,36 @@ def in_words(report: DesignReport) -> str:
     )
 
 
-def robot_yaml(report: DesignReport) -> str:
-    """The robot file of the design: the original with another radius and trail. `load_robot` gives the same robot."""
-    content = report.design.robot.model_dump(mode="json", exclude_none=True)
-    header = (
-        f"# {report.original.name} with wheels of {1e3 * report.design.radius:.1f} mm radius and "
-        f"{1e3 * report.design.trail:.1f} mm trail, by `caster-gym design`; its motors are those of the original.\n"
-    )
-    return header + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-
-
 def page(report: DesignReport) -> str:
     """The results in Markdown."""
     settings, design = report.settings, report.design
     sizes = [("as it was", *design.own), ("**best**", design.radius, design.trail, design.value), *design.nearby]
-    lines = [
+    parts = [
         f"# A design for {report.original.name}",
-        "",
         f"Asked for: {settings.speed:g} m/s in every direction with {settings.yaw_rate:g} rad/s; accelerations of "
         f"{settings.acceleration:g} m/s² and {settings.yaw_acceleration:g} rad/s² up to "
         f"{100 * settings.accelerating_up_to:g} % of these speeds; starts from rest with the casters at any angle"
         f"{_payload_words(settings)}{_path_words(settings)}. Driven: {', '.join(report.original.driven)}. "
         f"Margin on torque and speed: {settings.margin:g}.",
-        "",
-        f"| | radius [mm] | trail [mm] | {OBJECTIVES[settings.objective]} |",
-        "|---|---|---|---|",
-        *(f"| {words} | {1e3 * r:.1f} | {1e3 * d:.1f} | {_use_words(value, 3)} |" for words, r, d, value in sizes),
-        "",
+        markdown_table(
+            ("", "radius [mm]", "trail [mm]", OBJECTIVES[settings.objective]),
+            [(words, f"{1e3 * r:.1f}", f"{1e3 * d:.1f}", _use_words(value, 3)) for words, r, d, value in sizes],
+        ),
         f"{MEANINGS[settings.objective]} {_bound_words(design)}{_speed_words(report)}",
-        "",
         "![objective over radius and trail; motors asked for and there](design.png)",
-        "",
         "## Motors",
-        "",
         "Greatest torque, speed and power, margin included, of each motor as the robot file counts it. The smallest "
         "motor is the one of least standstill torque times top speed whose line, falling from that torque to zero at "
         "that speed, lies above all that is asked. Use is what is asked over what the file's motor has left at its "
         "speed; 1 is the limit.",
-        "",
-        "| motor | torque [N m] | speed [rad/s] | power [W] | smallest motor | in the file | before | use | enough |",
-        "|---|---|---|---|---|---|---|---|---|",
-        *map(_motor_line, report.after.motors, report.before.motors),
-        "",
+        markdown_table(MOTOR_HEADS, map(_motor_row, report.after.motors, report.before.motors)),
         f"{report.after.factor:.2f} times all torques of the file, with the top speeds of the smallest motors, would "
         "do. The motors share the work with the least sum of squared shares, as paths are checked by; so, without "
         f"margin, the one that works hardest gives {100 * report.after.share:.0f} % of its standstill torque in the "
         f"envelope. No way of sharing needs less than {100 * report.after.least_share:.0f} %.",
-        "",
         "`robot.yaml` is the robot with the best radius and trail, and with the motors of the original.",
     ]
-    return "\n".join(lines) + "\n"
+    return join_parts(parts)
 
 
 def _bound_words(design: Design) -> str:
@@ -217,31 +210,19 @@ def _path_words(settings: DesignSettings) -> str:
     return f"; the paths {', '.join(path.shape for path in settings.paths)}" if settings.paths else ""
 
 
-def _motor_line(motor: MotorRequirement, earlier: MotorRequirement) -> str:
+def _motor_row(motor: MotorRequirement, earlier: MotorRequirement) -> tuple[str, ...]:
     return (
-        f"| {motor.joint} | {motor.torque:.3g} | {motor.speed:.3g} | {motor.power:.3g} "
-        f"| {motor.standstill_torque:.3g} N m, {motor.top_speed:.3g} rad/s "
-        f"| {motor.has_torque:.3g} N m, {motor.has_speed:.3g} rad/s "
-        f"| {_use_words(earlier.use)} | {_use_words(motor.use)} | {'yes' if motor.enough else '**no**'} |"
+        motor.joint,
+        f"{motor.torque:.3g}",
+        f"{motor.speed:.3g}",
+        f"{motor.power:.3g}",
+        f"{motor.standstill_torque:.3g} N m, {motor.top_speed:.3g} rad/s",
+        f"{motor.has_torque:.3g} N m, {motor.has_speed:.3g} rad/s",
+        _use_words(earlier.use),
+        _use_words(motor.use),
+        "yes" if motor.enough else "**no**",
     )
 
 
 def _use_words(use: float, digits: int = 2) -> str:
     return "too fast" if use == float("inf") else f"{use:.{digits}f}"
-
-
-def _row(motor: MotorRequirement, earlier: MotorRequirement) -> tuple[str | float | bool, ...]:
-    return (
-        motor.joint,
-        motor.torque,
-        motor.speed,
-        motor.power,
-        motor.standstill_torque,
-        motor.top_speed,
-        motor.has_torque,
-        motor.has_speed,
-        motor.has_power,
-        motor.use,
-        motor.enough,
-        earlier.use,
-    )

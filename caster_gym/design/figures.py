@@ -8,7 +8,7 @@ import numpy as np
 
 from caster_gym.design.search import Design, DesignTarget, wheel_room
 from caster_gym.design.sizing import MotorRequirement, Requirement
-from caster_gym.render.palette import SERIES as COLOURS
+from caster_gym.report.figures import COLOURS, empty_figure, legend_below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,13 +23,11 @@ _TITLES = {
 
 def write_design_figure(path: Path, target: DesignTarget, design: Design, requirement: Requirement) -> None:
     """The objective as colours, and bars of torque, speed and power, as a PNG file."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.5, 5.6), layout="constrained")
+    figure = empty_figure((12.5, 5.6))
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.15, 1.0))[0]
     axis = left.subplots()
     draw_objective(axis, target, design)
-    left.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small")
+    legend_below(left, axis, 4, fontsize="small")
     motors = requirement.motors
     torques, speeds, powers = right.subplots(3, 1, sharex=True)
     draw_bars(torques, "torque [N m]", [m.torque for m in motors], [m.has_torque for m in motors])
@@ -38,8 +36,8 @@ def write_design_figure(path: Path, target: DesignTarget, design: Design, requir
     draw_bars(powers, "power [W]", [m.power for m in motors], [m.has_power for m in motors])
     powers.set_xticks(range(len(motors)), [m.joint for m in motors], rotation=30, ha="right")
     right.suptitle(f"motors of the best design, margin {target.margin:g} included", fontsize="medium")
-    right.legend(*torques.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="small")
-    figure.savefig(path, dpi=110)
+    legend_below(right, torques, 3, fontsize="small")
+    figure.savefig(path)
 
 
 def draw_objective(axis: "Axes", target: DesignTarget, design: Design) -> None:

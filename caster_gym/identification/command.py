@@ -3,7 +3,6 @@
 The file is read and checked before anything heavy is imported, so that a refusal comes at once.
 """
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,9 +25,11 @@ from caster_gym.identification.unknowns import (
     unknowns,
 )
 from caster_gym.mechanics.parameters import Dynamics
-from caster_gym.report.page import markdown_table
+from caster_gym.report.pages import join_parts
 from caster_gym.report.provenance import write_provenance
+from caster_gym.report.robot_files import robot_yaml
 from caster_gym.report.run_folder import check_file, check_free, staged
+from caster_gym.report.tables import markdown_table, write_csv
 from caster_gym.robot import load_robot
 
 if TYPE_CHECKING:
@@ -122,29 +123,20 @@ def write_identification(found: "Identification", recording: Path, settings: Ide
 
     folder.mkdir(parents=True, exist_ok=True)
     write_identify_figure(folder / "identified.png", found)
-    with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["name", "unit", "told", "start", "estimate", "standard_deviation", "low", "high"])
-        told = found.is_told
-        for k, one in enumerate(found.unknowns):
-            value, half = found.estimates[k], found.half_widths[k]
-            spread = (found.deviations[k], value - half, value + half) if told[k] else ("", "", "")
-            writer.writerow([one.name, one.unit, bool(told[k]), one.start, value, *spread])
-    (folder / "robot.yaml").write_text(robot_yaml(found, recording), encoding="utf-8")
+    rows = []
+    for k, one in enumerate(found.unknowns):
+        value, half, told = found.estimates[k], found.half_widths[k], bool(found.is_told[k])
+        spread = (found.deviations[k], value - half, value + half) if told else ("", "", "")
+        rows.append((one.name, one.unit, told, one.start, value, *spread))
+    heads = ("name", "unit", "told", "start", "estimate", "standard_deviation", "low", "high")
+    write_csv(folder / "identified.csv", heads, rows)
+    names = ", ".join(one.name for one, told in zip(found.unknowns, found.is_told, strict=True) if told) or "nothing"
+    remark = f"{found.robot.name} as identified from {recording.name} by `caster-gym identify`: {names}."
+    text = robot_yaml(found.robot, remark, "A payload is part of the platform.")
+    (folder / "robot.yaml").write_text(text, encoding="utf-8")
     (folder / "features.yaml").write_text(features_yaml(found, recording), encoding="utf-8")
     write_provenance(folder, recording=str(recording), settings=settings.model_dump(mode="json"))
     (folder / "identified.md").write_text(page(found, recording), encoding="utf-8")
-
-
-def robot_yaml(found: "Identification", recording: Path) -> str:
-    """The robot file with the estimates in it; `load_robot` gives the same robot."""
-    content = found.robot.model_dump(mode="json", exclude_none=True)
-    names = ", ".join(one.name for one, told in zip(found.unknowns, found.is_told, strict=True) if told) or "nothing"
-    header = (
-        f"# {found.robot.name} as identified from {recording.name} by `caster-gym identify`: {names}.\n"
-        "# A payload is part of the platform.\n"
-    )
-    return header + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
 
 
 def features_yaml(found: "Identification", recording: Path) -> str:
@@ -228,7 +220,7 @@ def page(found: "Identification", recording: Path) -> str:
         "came out below zero as zero, motors' greatest torques multiplied by their strengths. Steering zeros, biases, "
         "delay and lag have no place in it; where they were estimated, they stand in `features.yaml`.",
     ]
-    return "\n\n".join(parts) + "\n"
+    return join_parts(parts)
 
 
 def _estimate_rows(found: "Identification") -> list[tuple[str, ...]]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from caster_gym.arrays import Array
 from caster_gym.identification.fit import Identification
 from caster_gym.identification.recording import KIND_UNITS
-from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,8 +53,8 @@ def write_identify_figure(path: Path, found: Identification) -> None:
         axis.set_xlabel("time [s]")
     figure.axes[0].set_title("measured and predicted", fontsize="medium")
     figure.axes[1].set_title("predicted minus measured", fontsize="medium")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    figure.savefig(path, dpi=110)
+    legend_below(figure, figure.axes[0], 3)
+    figure.savefig(path)
 
 
 _LABELS = ("predicted with the starting values", "predicted with the estimates")

@@ -14,7 +14,6 @@ Columns without a unit are in the one given here. docs/files.md tells which othe
 Other columns are left out, and times that jitter are made even; a TableNote tells of both.
 """
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from caster_gym.engines.time_step import longest_time_step, substeps_for
 from caster_gym.identification.recording_table import FEWEST_ROWS, POSE, TWIST, read_measured
 from caster_gym.identification.rolling import rolled_along
 from caster_gym.mechanics.parameters import Dynamics
+from caster_gym.report.tables import write_csv
 from caster_gym.robot import Robot
 
 
@@ -171,10 +171,8 @@ def write_recording(path: str | Path, recording: Recording) -> None:
     names += [f"torque_{kind}_{i}" for i in casters for kind in ("roll", "steer")]
     time = recording.time_step * np.arange(len(recording.pose))
     rows = np.column_stack([time, recording.measured, recording.torque])
-    with Path(path).expanduser().open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([f"{name} [{_unit(name)}]" for name in names])
-        writer.writerows([[f"{number:.10g}" for number in row] for row in rows])
+    heads = [f"{name} [{_unit(name)}]" for name in names]
+    write_csv(Path(path).expanduser(), heads, ([f"{number:.10g}" for number in row] for row in rows))
 
 
 def read_recording(path: str | Path, robot: Robot) -> Recording:

@@ -29,6 +29,3 @@ SOLID_EDGE: Colour = (122, 132, 145)
 CENTRE: Colour = (255, 176, 0)  # the robot's reference point C, and nothing else
 INK: Colour = (38, 43, 51)
 FAINT_INK: Colour = (116, 126, 139)
-
-# Lines of figures, by Okabe and Ito, distinguishable with colour-blind eyes
-SERIES = ("#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#F0E442", "#000000")

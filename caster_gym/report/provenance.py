@@ -1,8 +1,11 @@
 """Where a result came from: versions, commit and settings, written beside it."""
 
 import platform
+import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,11 +21,23 @@ def versions() -> dict[str, str]:
     """Versions of caster_gym, its commit, Python and the packages that results depend on."""
     found = {"caster_gym": caster_gym.__version__, "commit": commit(), "python": platform.python_version()}
     for package in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return found
+
+
+def versions_in_words(*packages: str) -> str:
+    """Versions of Python and of those of the packages that are installed, on one line."""
+    found = {"Python": platform.python_version()}
+    for package in packages:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return ", ".join(f"{name} {number}" for name, number in found.items())
+
+
+def command_line(module: str, arguments: Sequence[str] | None) -> str:
+    """The command that runs a module with these arguments, or, if None, with those of this process."""
+    return shlex.join(["python", "-m", module, *(sys.argv[1:] if arguments is None else arguments)])
 
 
 def commit() -> str:
@@ -38,9 +53,11 @@ def commit() -> str:
 
 
 def write_provenance(folder: Path, **content: Any) -> None:
-    """run.yaml: the command, the versions, and whatever else tells how a result came about."""
+    """run.yaml: the command, the versions, and whatever else explains how a result came about."""
     folder.mkdir(parents=True, exist_ok=True)
-    full = {"command": " ".join([Path(sys.argv[0]).name, *sys.argv[1:]]), "versions": versions(), **content}
+    program = Path(sys.argv[0])
+    name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
+    full = {"command": " ".join([name, *sys.argv[1:]]), "versions": versions(), **content}
     (folder / "run.yaml").write_text(yaml.safe_dump(full, sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
-from caster_gym.report.page import Check, Picture, Section, Table
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
 from caster_gym.robot import load_robot
 from papers.analysis.impulse_circles import CELLS, SLICES, CircleCurve, circle_curves, greatest_elongation
 from papers.analysis.impulse_shape import anisotropy, effective_mass, ellipse_gap, elongation, extremes
@@ -19,6 +18,8 @@ from papers.chung2008.impulse_checks import (
     with_unrounded_pivots,
 )
 from papers.notation import CHUNG2008
+from papers.page import Check, Picture, Section, Table
+from papers.robot_drawing import draw_robot
 
 JOINTS = ("steer_1", "steer_2", "steer_3")
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
@@ -208,7 +209,7 @@ def _picture_of_robots() -> Picture:
         reach = 1.08 * float(shape.greatest) * np.array([-1.0, 1.0])
         axis.set(title=name, xlabel="along the wheels [kg]", aspect="equal", xlim=reach, ylim=reach)
     figure.axes[0].set_ylabel("across the wheels [kg]")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    legend_below(figure, figure.axes[0], 3, frameon=False)
     caption = (
         "Effective mass of C over all directions of the motion, all wheels parallel to x; dotted the ellipse with the "
         "same half axes. Where the ratio of greatest to least exceeds 2 the curve is dented."

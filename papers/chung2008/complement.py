@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.arrays import Array
-from caster_gym.report.page import Section, Table
 from caster_gym.robot import load_robot
 from papers.analysis.coordinate_switching import (
     all_complements,
@@ -39,6 +38,7 @@ from papers.chung2008.complement_runs import (
     relative,
 )
 from papers.notation import in_letters
+from papers.page import Section, Table
 
 LIMITS = (LIMIT, 1000.0)
 PAPER_ALONE, CHANGED = f"{in_letters(PAPER_SET)} alone", "changed above {:g}"

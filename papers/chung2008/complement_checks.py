@@ -6,12 +6,12 @@ from numpy.typing import ArrayLike, NDArray
 from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import action_lines
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.page import Check, Difference
 from caster_gym.robot import load_robot
 from papers.analysis.joint_kinematics import forward_jacobian
 from papers.analysis.orthogonal_complement import OrthogonalComplement
 from papers.chung2008.complement_runs import DISTANCES, PERIOD, Approach, relative
 from papers.notation import CHUNG2008, Lengths, in_words, lengths_of
+from papers.page import Check, Difference
 from papers.printed_jacobians import CHUNG2008_FORWARD
 
 PAPER_SET = in_words("θ_1 θ_2 φ_3")  # (A9)

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.arrays import Array
-from caster_gym.report.drawing import COLOURS, new_figure
-from caster_gym.report.page import Picture
+from caster_gym.report.figures import COLOURS, new_figure
 from papers.analysis.coordinate_switching import singular_steering
 from papers.analysis.orthogonal_complement import OrthogonalComplement
 from papers.chung2008.complement_runs import Approach
 from papers.line_drawing import LEGEND, draw_lines
 from papers.notation import in_letters
+from papers.page import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

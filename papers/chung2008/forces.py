@@ -8,13 +8,13 @@ from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.shapes import Circle
-from caster_gym.report.page import Check, Difference, Section, Table
 from caster_gym.robot import Robot, load_robot
 from papers.analysis.driven_motion import DrivenMotion, inertial_force, lead, work
 from papers.analysis.model_comparison import carried_mass
 from papers.chung2008 import inertia, wheel_mass
 from papers.chung2008.motion_pictures import FORCE_AXES, draw_energy, draw_forces, draw_joints, draw_path
 from papers.notation import CHUNG2008
+from papers.page import Check, Difference, Section, Table
 
 RADIUS = 1.0  # [m] of Fig. 5
 DURATION = 60.0  # [s]

@@ -6,13 +6,13 @@ import numpy as np
 
 from caster_gym.analysis.frames import turned
 from caster_gym.arrays import Array
-from caster_gym.report.drawing import COLOURS, new_figure
-from caster_gym.report.page import Check, Difference, Picture, Section, Table
+from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
 from papers.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
 from papers.chung2008.kinematics import Sample
 from papers.jacobian_checks import ROUNDING
 from papers.notation import CHUNG2008
+from papers.page import Check, Difference, Picture, Section, Table
 from papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 
 if TYPE_CHECKING:

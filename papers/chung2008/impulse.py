@@ -3,8 +3,7 @@
 import numpy as np
 
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
-from caster_gym.report.page import Picture, Section, Table
+from caster_gym.report.figures import COLOURS, legend_below, new_figure
 from caster_gym.robot import load_robot
 from papers.analysis.impulse_circles import greatest_elongation
 from papers.analysis.impulse_shape import Extremes, anisotropy, extremes, impulse, loss_share
@@ -19,6 +18,8 @@ from papers.chung2008.impulse_checks import (
     size_of,
     steering_of,
 )
+from papers.page import Picture, Section, Table
+from papers.robot_drawing import draw_robot
 
 
 def section() -> Section:
@@ -140,7 +141,7 @@ def _picture(model: Model, bare: Model) -> Picture:
         axis.set(xlabel="towards +x [N s]", xlim=(-15.0, 15.0), ylim=(-15.0, 15.0), aspect="equal")
     above[0].set_ylabel("y [m]")
     below[0].set_ylabel("towards +y [N s]")
-    figure.legend(*below[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    legend_below(figure, below[0], 3, frameon=False)
     caption = (
         "Figs. 16 to 19 and Fig. 18 mirrored. Above: the steering, in the body frame. Below: the impulse over all "
         "directions of the motion. Of these five it is uniform in Fig. 18 alone; without wheels it always is."

@@ -5,7 +5,6 @@ from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.page import Check, Difference
 from caster_gym.robot import Robot
 from papers.analysis.impulse_shape import (
     Extremes,
@@ -15,6 +14,7 @@ from papers.analysis.impulse_shape import (
     extremes,
 )
 from papers.notation import CHUNG2008
+from papers.page import Check, Difference
 
 CONFIGURATIONS = {
     "Fig. 16": (0.0, 0.0, 0.0),

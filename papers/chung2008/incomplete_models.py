@@ -5,7 +5,6 @@ import numpy as np
 from caster_gym.agents.comparison.track_metrics import SETTLING
 from caster_gym.agents.control.computed_torque import gains
 from caster_gym.arrays import Array
-from caster_gym.report.page import Check, Difference, Section, Table
 from papers.chung2008.model_figures import picture
 from papers.chung2008.model_trials import (
     BARE,
@@ -27,6 +26,7 @@ from papers.chung2008.model_trials import (
     exponents,
     study,
 )
+from papers.page import Check, Difference, Section, Table
 
 WORSE = 2.0  # times the error count as degraded
 EQUAL = 1.1  # times the error count as the same

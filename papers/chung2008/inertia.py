@@ -9,10 +9,10 @@ from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.dynamics import caster_inertias
 from caster_gym.mechanics.parameters import robot_parameters
-from caster_gym.report.page import Check, Difference, Table, check_number
 from caster_gym.robot import Link, Robot, load_robot
 from papers.analysis.driven_motion import steady_steering
 from papers.notation import CHUNG2008
+from papers.page import Check, Difference, Table, check_number
 
 ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 WITH_WHEELS = ("5.4329", "0.0537", "-0.00078", "7.5379", "0.0107", "0.0397")

@@ -8,7 +8,6 @@ from caster_gym.design.joint_sets import JointSet, classify_all, proved_brackets
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
-from caster_gym.report.page import Check, Difference, Section
 from caster_gym.robot import load_robot
 from papers.analysis import mobility
 from papers.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
@@ -21,6 +20,7 @@ from papers.jacobian_checks import (
     off_inverse,
 )
 from papers.notation import CHUNG2008, Lengths, in_letters, lengths_of
+from papers.page import Check, Difference, Section
 from papers.printed_jacobians import CHUNG2008_FORWARD, CHUNG2008_INVERSE
 
 COUNT = 1000  # random configurations

@@ -10,11 +10,11 @@ from caster_gym.paths.headings import Spinning
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse, Lemniscate, Shape
 from caster_gym.paths.trajectory import Trajectory
-from caster_gym.report.page import Check, Difference, Section, Table
 from caster_gym.robot import Robot, load_robot
 from papers.analysis.driven_motion import DrivenMotion, inertial_force, lead
 from papers.analysis.model_comparison import carried_mass, force_by_momenta, force_size, missing_force
 from papers.chung2008.missing_term_pictures import FORCE_AXES, Forces, picture_at_random, picture_on_circle
+from papers.page import Check, Difference, Section, Table
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
 ON_CIRCLE = ("chung2008", "xr4000")  # that are drawn

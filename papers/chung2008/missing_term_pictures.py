@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from caster_gym.arrays import Array
-from caster_gym.report.drawing import COLOURS, new_figure
-from caster_gym.report.page import Picture
+from caster_gym.report.figures import COLOURS, new_figure
 from papers.chung2008.motion_pictures import FORCE_AXES
+from papers.page import Picture
 
 __all__ = ["FORCE_AXES", "Forces", "picture_at_random", "picture_on_circle"]
 

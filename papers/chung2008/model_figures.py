@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.report.drawing import COLOURS, new_figure
-from caster_gym.report.page import Picture
+from caster_gym.report.figures import COLOURS, new_figure
 from papers.chung2008.model_trials import BARE, EXACT, FREQUENCIES, MODELS, PATHS, PRINTED, SOFT, STIFF, Study
+from papers.page import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,11 +6,12 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
-from caster_gym.report.page import Picture
+from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
 from papers.analysis.driven_motion import DrivenMotion
 from papers.notation import CHUNG2008
+from papers.page import Picture
+from papers.robot_drawing import draw_robot
 
 FORCE_AXES = ("F_x [N]", "F_y [N]", "M_z [N m]")
 

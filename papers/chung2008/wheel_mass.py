@@ -8,10 +8,10 @@ from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.headings import Heading, Spinning, Tangent
 from caster_gym.paths.shapes import Circle, Ellipse, Shape
-from caster_gym.report.drawing import new_figure
-from caster_gym.report.page import Check, Difference, Picture, Section, Table
+from caster_gym.report.figures import new_figure
 from caster_gym.robot import Robot, Wheel, load_robot
 from papers.analysis.driven_motion import inertial_force, lead
+from papers.page import Check, Difference, Picture, Section, Table
 
 BASE = 0.1  # [m] radius b of the platform, a disc
 TIME_STEP = 0.05  # [s]

@@ -6,7 +6,6 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.design.isotropy import INTERVAL
-from caster_gym.report.page import Check, Difference, Picture, Section, Table, check_number
 from papers.kim2001.isotropy_pictures import FIGURES, contours, local_indices
 from papers.kim2001.isotropy_search import (
     FOUR,
@@ -29,6 +28,7 @@ from papers.kim2001.isotropy_search import (
 from papers.kim2001.steering_only import text as text_on_steering
 from papers.kim2001.steering_only import workspace_check
 from papers.notation import in_letters
+from papers.page import Check, Difference, Picture, Section, Table, check_number
 
 LAST_DIGIT = 5e-4  # half a unit of it in Table 2
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
 from caster_gym.design.isotropy import INTERVAL, global_isotropies
-from caster_gym.report.page import Check, Table, check_number
 from papers.notation import in_letters, in_words, kim2001_robot
+from papers.page import Check, Table, check_number
 
 RATIOS = (0.1, 0.5, 1.0, 5.0, 10.0)  # of the top rates of steering and rolling, and of ω_max and v_max [1/a]
 GRID = (*(k / 10.0 for k in range(1, 10)), 1.0, 1.3, 1.6, 2.0, 2.5, 3.2, 3.9, 5.0, 6.3, 7.9, 10.0)  # of r and d [a]

@@ -7,7 +7,7 @@ import numpy as np
 
 from caster_gym.design.joint_sets import Class, JointSet, set_types
 from caster_gym.design.singular_lines import kind_and_caster
-from caster_gym.report.drawing import COLOURS, new_figure
+from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
 
 if TYPE_CHECKING:

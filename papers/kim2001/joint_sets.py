@@ -8,10 +8,10 @@ import numpy as np
 
 from caster_gym.design.joint_sets import Bracket, JointSet, classify_all, proved_brackets, rounded_down, set_types
 from caster_gym.design.singular_lines import kind_and_caster, smallest_singular_value
-from caster_gym.report.page import Check, Difference, Picture, Section, Table
 from caster_gym.robot import Robot, load_robot
 from papers.kim2001.joint_set_lattice import CLASSES, joint_set_lattice
 from papers.notation import KIM2001, in_letters, in_words, kim2001_robot
+from papers.page import Check, Difference, Picture, Section, Table
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
 ADMISSIBLE = ("θ_1 φ_1 θ_2 φ_2", "θ_1 φ_1 θ_3 φ_3", "θ_2 φ_2 θ_3 φ_3")  # as printed

@@ -6,8 +6,7 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.drawing import COLOURS, draw_robot, new_figure
-from caster_gym.report.page import Check, Difference, Picture, Section, check_number
+from caster_gym.report.figures import COLOURS, new_figure
 from papers.jacobian_checks import (
     ROUNDING,
     check_inverse,
@@ -17,6 +16,7 @@ from papers.jacobian_checks import (
     off_inverse,
 )
 from papers.notation import CHUNG2008, KIM2001, Lengths, Notation, kim2001_robot, lengths_of
+from papers.page import Check, Difference, Picture, Section, check_number
 from papers.printed_jacobians import (
     KIM2001_FORWARD,
     KIM2001_FOUR,
@@ -25,6 +25,7 @@ from papers.printed_jacobians import (
     KIM2001_THREE,
     Printed,
 )
+from papers.robot_drawing import draw_robot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,6 @@
 import numpy as np
 
 from caster_gym.design.isotropy import balanced_isotropy, isotropy
-from caster_gym.report.page import Check, Difference, Picture, Section, check_number
 from papers.kim2001.isotropy_pictures import FIGURES, TWIST, best_quotient, contours, local_indices
 from papers.kim2001.isotropy_search import (
     FOUR,
@@ -21,6 +20,7 @@ from papers.kim2001.isotropy_search import (
     searched,
 )
 from papers.notation import kim2001_robot
+from papers.page import Check, Difference, Picture, Section, check_number
 
 SHORT = 1e-9  # [a] steering links and wheels of next to no size; and numbers that differ by less are the same
 

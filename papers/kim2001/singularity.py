@@ -10,10 +10,10 @@ from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
 from caster_gym.design.singular_lines import action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.drawing import new_figure
-from caster_gym.report.page import Check, Difference, Picture, Section
+from caster_gym.report.figures import new_figure
 from papers.line_drawing import LEGEND, draw_lines
 from papers.notation import KIM2001, Lengths, in_letters, in_words, kim2001_robot, lengths_of
+from papers.page import Check, Difference, Picture, Section
 from papers.printed_jacobians import KIM2001_THREE
 
 if TYPE_CHECKING:

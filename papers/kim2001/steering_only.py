@@ -6,10 +6,10 @@ from caster_gym.analysis.frames import turned
 from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import smallest_singular_value
 from caster_gym.engines.numpy_model import Model
-from caster_gym.report.page import Check
 from papers.analysis.driven_motion import steady_steering
 from papers.kim2001.isotropy_search import RATIOS, ROBOT, TYPES, searched
 from papers.notation import in_words
+from papers.page import Check
 
 JOINTS = in_words("φ_1 φ_2 φ_3")
 MOTIONS = 1000  # steady ones, at random

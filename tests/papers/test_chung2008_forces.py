@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.report.page import unexplained
 from papers.analysis.driven_motion import lead
 from papers.chung2008 import forces as paper
+from papers.page import unexplained
 
 ROBOT = load_robot("chung2008")
 

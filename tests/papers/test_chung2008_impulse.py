@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from caster_gym import Model, load_robot
-from caster_gym.report.page import unexplained
 from papers.analysis.impulse_shape import extremes
 from papers.chung2008 import circles, impulse
 from papers.chung2008.impulse_checks import printed_impulse, steering_of
+from papers.page import unexplained
 
 MODEL = Model(load_robot("chung2008"))
 

@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Ellipse
-from caster_gym.report.page import unexplained
 from papers.chung2008 import incomplete_models, model_trials
 from papers.chung2008.model_trials import BARE, EXACT, FREQUENCIES, PATHS, SOFT
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from caster_gym.report.page import unexplained
 from papers.chung2008.kinematics import section
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
-from caster_gym.report.page import unexplained
 from papers.analysis.model_comparison import carried_mass
 from papers.chung2008 import missing_term as paper
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

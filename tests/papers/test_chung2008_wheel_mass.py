@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
-from caster_gym.report.page import unexplained
 from papers.chung2008 import wheel_mass as paper
+from papers.page import unexplained
 
 ROBOT = load_robot("chung2008")
 

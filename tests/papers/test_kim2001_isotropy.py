@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.report.page import Section, unexplained
 from papers.kim2001 import isotropy, redundancy
 from papers.kim2001.isotropy_pictures import local_indices
 from papers.kim2001.isotropy_search import FOUR, TYPES
+from papers.page import Section, unexplained
 
 BUILDERS = (isotropy.three_joints, redundancy.four_joints, redundancy.six_joints)
 

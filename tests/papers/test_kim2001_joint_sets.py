@@ -2,9 +2,9 @@
 
 import pytest
 
-from caster_gym.report.page import unexplained
 from papers.kim2001.joint_sets import ADMISSIBLE, section
 from papers.notation import in_letters, in_words
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from caster_gym.report.page import unexplained
 from papers.kim2001.kinematics import CELLS, global_index, section
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

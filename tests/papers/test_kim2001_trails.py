@@ -5,8 +5,8 @@ import pytest
 
 from caster_gym.design.joint_sets import classify
 from caster_gym.design.singular_lines import smallest_singular_value
-from caster_gym.report.page import unexplained
 from papers.kim2001.trails import THREE_MOTORS, section, unequal_robot
+from papers.page import unexplained
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from caster_gym import load_robot
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
-from caster_gym.report.drawing import new_figure
+from caster_gym.report.figures import new_figure
 from papers.line_drawing import FREE_MOTION, draw_lines
 
 ROBOT = load_robot("chung2008")

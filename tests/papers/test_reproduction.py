@@ -5,9 +5,9 @@ from importlib import import_module
 import pytest
 from typer.testing import CliRunner
 
-from caster_gym.report.page import Check, Difference, Section
 from papers import reproduction
 from papers.__main__ import app
+from papers.page import Check, Difference, Section
 from papers.reproduction import PAPERS, Paper, find_paper, reproduce
 
 

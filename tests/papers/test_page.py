@@ -4,8 +4,8 @@ import csv
 
 import pytest
 
-from caster_gym.report.drawing import draw_robot, new_figure
-from caster_gym.report.page import (
+from caster_gym.report.figures import new_figure
+from papers.page import (
     Check,
     Difference,
     Picture,
@@ -13,12 +13,10 @@ from caster_gym.report.page import (
     Table,
     check_number,
     differences_page,
-    markdown_table,
     printed_checks,
     unexplained,
     write_page,
 )
-from caster_gym.robot import load_robot
 
 
 @pytest.mark.parametrize(
@@ -149,19 +147,3 @@ def test_a_page_counts_each_reason_once_and_readings_apart(tmp_path):
         "1 depends on the reading, for 1 reason (E1)."
     ) in page
     assert "| (2) | always | sometimes | depends on the reading | E1: not when it rains |" in page
-
-
-def test_numbers_in_tables_have_four_digits():
-    assert markdown_table(("a",), [(12345.678,), (1e-9,), ("word",)]).endswith("| 1.235e+04 |\n| 1e-09 |\n| word |")
-
-
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2"])
-def test_a_drawn_wheel_stands_behind_its_pivot(name):
-    """The link's line goes from the pivot by the trail against the rolling direction, here along −x."""
-    robot = load_robot(name)
-    axis = new_figure().axes[0]
-    draw_robot(axis, robot, [0.0] * robot.caster_count)
-    links = [line.get_xydata() for line in axis.lines if len(line.get_xydata()) == 2]
-    for caster, ((x, y), (wheel_x, wheel_y)) in zip(robot.casters, links, strict=True):
-        assert (x, y) == (caster.x, caster.y)
-        assert (wheel_x, wheel_y) == pytest.approx((caster.x - caster.trail, caster.y + caster.offset), abs=1e-15)

@@ -1,35 +1,20 @@
-"""How figures of the papers are drawn: one style, and the robot from above."""
+"""A robot seen from above, drawn into the axes of a figure."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from caster_gym.render.palette import SERIES as COLOURS
 from caster_gym.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["COLOURS", "draw_robot", "new_figure"]
 
 OUTLINE, LINK, WHEEL = "#345C8C", "#707C8B", "#262B33"
 
 
-def new_figure(rows: int = 1, columns: int = 1, size: tuple[float, float] = (4.6, 3.4), **options: Any) -> "Figure":
-    """A figure with a grid of axes, each of a size [in]; options as for matplotlib's `subplots`."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(columns * size[0], rows * size[1]), layout="constrained")
-    figure.subplots(rows, columns, squeeze=False, **options)
-    for axis in figure.axes:
-        axis.grid(alpha=0.3)
-    return figure
-
-
 def draw_robot(axis: "Axes", robot: Robot, steering: ArrayLike) -> None:
-    """The robot from above, in its body frame [m]: platform, steering links from pivot to wheel, wheels with axles.
+    """Draw a robot in its body frame [m]: outline of the platform, steering links from pivot to wheel, and wheels.
 
     steering (N,) [rad]. The x-axis points to the right.
     """

@@ -15,6 +15,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
+from caster_gym.report.pages import join_parts
+from caster_gym.report.tables import markdown_table, write_csv
 from papers.scans import REPAIRS
 
 if TYPE_CHECKING:
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 Nature: TypeAlias = Literal["print", "scan, probably", "scan, possibly", "reading"]
 
 LONGEST_TABLE = 40  # rows that a page shows; a longer table is a file only
-DOTS_PER_INCH = 110
 
 
 class Check(NamedTuple):
@@ -146,11 +147,11 @@ def write_page(name: str, title: str, reference: str, sections: Sequence[Section
             raise ValueError(f"two tables or figures of {name} are called {twice[0]!r}")
     for section in sections:
         for table in section.tables:
-            _write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
+            write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
         for picture in section.pictures:
-            picture.figure.savefig(folder / f"{picture.name}.png", dpi=DOTS_PER_INCH)
-    _write_csv(folder / "checks.csv", Check._fields, [check for section in sections for check in section.checks])
-    _write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
+            picture.figure.savefig(folder / f"{picture.name}.png")
+    write_csv(folder / "checks.csv", Check._fields, [check for section in sections for check in section.checks])
+    write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
     return _page(name, title, reference, sections)
 
 
@@ -183,7 +184,7 @@ def differences_page(out: Path, names: Sequence[str]) -> str:
             text,
             markdown_table(("paper", "where", "as scanned", "read as"), repairs),
         ]
-    return "\n\n".join(parts) + "\n"
+    return join_parts(parts)
 
 
 _ABOUT_SCANS = """\
@@ -237,7 +238,7 @@ def _page(name: str, title: str, reference: str, sections: Sequence[Section]) ->
                 parts.append(markdown_table(table.columns, table.rows))
         for picture in section.pictures:
             parts += [f"![{picture.title}]({name}/{picture.name}.png)", f"*{picture.caption}*"]
-    return "\n\n".join(parts) + "\n"
+    return join_parts(parts)
 
 
 def _verdicts(checks: Sequence[Check], columns: tuple[str, str, str], sections: Sequence[Section]) -> list[str]:
@@ -252,21 +253,7 @@ def _verdict(check: Check, sections: Sequence[Section]) -> str:
     return "depends on the reading" if depends_on_reading(check, sections) else "**fail**"
 
 
-def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str | float]]) -> str:
-    """A table in Markdown; numbers with four significant digits."""
-    lines = [[*columns], ["---"] * len(columns)]
-    lines += [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
-
-
 def _half_unit(printed: str) -> float:
     """Half a unit of the last printed digit of a number."""
     mantissa, _, exponent = printed.lower().partition("e")
     return 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-
-
-def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)

@@ -1,0 +1,28 @@
+"""Tables for readers, in Markdown, and for programs, as CSV files."""
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+
+def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[object]], padded: bool = False) -> str:
+    """A table in Markdown; floats with four significant digits. padded: columns also line up in the plain text."""
+    lines = [[_cell(cell) for cell in row] for row in (columns, *rows)]
+    widths = [max(len(line[i]) for line in lines) if padded else 0 for i in range(len(columns))]
+    lines.insert(1, ["---".ljust(width, "-") for width in widths])
+    return "\n".join(
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |" for line in lines
+    )
+
+
+def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """A table as a CSV file in UTF-8, its first line the names of the columns; floats with all their digits."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def _cell(cell: object) -> str:
+    text = f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+    return text.replace("|", "\\|")
