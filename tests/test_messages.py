@@ -32,9 +32,6 @@ PROMISES = {
     "caster_gym/design/command.py": [
         "design_sizing::test_motors_of_exactly_the_required_size_drive_the_paths_and_smaller_ones_do_not"
     ],
-    "papers/chung2008/model_trials.py": [
-        "papers_chung2008_model_trials::test_the_shortest_time_leaves_the_motors_their_reserve_and_no_more"
-    ],
     "caster_gym/design/search.py": ["design_search::test_motors_that_are_too_slow_for_every_design_are_refused"],
     "caster_gym/arena/beside.py": [
         "arena_beside::test_where_there_is_no_room_the_path_is_named_and_so_many_as_are_told_fit"

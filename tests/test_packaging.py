@@ -68,7 +68,7 @@ def test_every_folder_of_the_package_is_listed():
         for top in ("caster_gym", *HOMES)
         for file in (ROOT / top).rglob("*.py")
     }
-    folders = {HOMES.get(name, name) for name in inside}
+    folders = {f"caster_gym.{name}" if name.partition(".")[0] in HOMES else name for name in inside}
     assert folders == set(PACKAGES)
     assert all((ROOT / name.replace(".", "/") / "__init__.py").is_file() for name in inside)
 
