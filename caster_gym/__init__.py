@@ -1,38 +1,121 @@
-"""Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control"""
+"""Omnidirectional robots on powered casters: exact dynamics, Gymnasium environments, learned and model-based control.
+
+All that users need is handed on from here, and is imported when it is first asked for; docs/api.md lists it.
+"""
 
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from gymnasium import register
 
 if TYPE_CHECKING:
+    from caster_gym import mechanics, wrappers
+    from caster_gym.agents.control.computed_torque import ComputedTorque
+    from caster_gym.agents.learning.bundle import load_policy
+    from caster_gym.agents.learning.sb3_environment import SB3VecEnv
+    from caster_gym.arena.arena import Arena
+    from caster_gym.arena.packing import surroundings
+    from caster_gym.configuration import ConfigurationError
+    from caster_gym.engines.native.fleet import Fleet
     from caster_gym.engines.numpy_model import Model
+    from caster_gym.engines.tensor.fleet import TorchFleet
+    from caster_gym.engines.tensor.model import TorchModel
+    from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
+    from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+    from caster_gym.envs.observation import ObservationLayout
+    from caster_gym.envs.tensor.task import TorchTask
+    from caster_gym.envs.tensor.vector_env import TorchVectorEnv
+    from caster_gym.export.mjcf import mjcf
+    from caster_gym.floor import Floor
+    from caster_gym.paths.specification import build_trajectories, read_paths
+    from caster_gym.paths.trajectory import Trajectory
     from caster_gym.robot import Robot, load_robot
 
 __version__ = "0.1.0"
-__all__ = ["Model", "Robot", "load_robot"]
+__all__ = [
+    "Arena",
+    "CasterFollowEnv",
+    "CasterFollowVectorEnv",
+    "CasterTrackEnv",
+    "CasterTrackVectorEnv",
+    "ComputedTorque",
+    "ConfigurationError",
+    "Fleet",
+    "Floor",
+    "Model",
+    "ObservationLayout",
+    "Robot",
+    "SB3VecEnv",
+    "TorchFleet",
+    "TorchModel",
+    "TorchTask",
+    "TorchVectorEnv",
+    "Trajectory",
+    "build_trajectories",
+    "load_policy",
+    "load_robot",
+    "mechanics",
+    "mjcf",
+    "read_paths",
+    "surroundings",
+    "wrappers",
+]
 
-_HOMES = {"Model": "caster_gym.engines.numpy_model", "Robot": "caster_gym.robot", "load_robot": "caster_gym.robot"}
+# The module that each name comes from. Whoever moves one changes it here and among the imports above.
+_HOMES = {
+    "Arena": "caster_gym.arena.arena",
+    "CasterFollowEnv": "caster_gym.envs.caster_follow",
+    "CasterFollowVectorEnv": "caster_gym.envs.caster_follow",
+    "CasterTrackEnv": "caster_gym.envs.caster_track",
+    "CasterTrackVectorEnv": "caster_gym.envs.caster_track",
+    "ComputedTorque": "caster_gym.agents.control.computed_torque",
+    "ConfigurationError": "caster_gym.configuration",
+    "Fleet": "caster_gym.engines.native.fleet",
+    "Floor": "caster_gym.floor",
+    "Model": "caster_gym.engines.numpy_model",
+    "ObservationLayout": "caster_gym.envs.observation",
+    "Robot": "caster_gym.robot",
+    "SB3VecEnv": "caster_gym.agents.learning.sb3_environment",
+    "TorchFleet": "caster_gym.engines.tensor.fleet",
+    "TorchModel": "caster_gym.engines.tensor.model",
+    "TorchTask": "caster_gym.envs.tensor.task",
+    "TorchVectorEnv": "caster_gym.envs.tensor.vector_env",
+    "Trajectory": "caster_gym.paths.trajectory",
+    "build_trajectories": "caster_gym.paths.specification",
+    "load_policy": "caster_gym.agents.learning.bundle",
+    "load_robot": "caster_gym.robot",
+    "mjcf": "caster_gym.export.mjcf",
+    "read_paths": "caster_gym.paths.specification",
+    "surroundings": "caster_gym.arena.packing",
+}
+_MODULES = ("mechanics", "wrappers")
 
 register(
     id="CasterTrack-v0",
-    entry_point="caster_gym.envs.caster_track:CasterTrackEnv",
-    vector_entry_point="caster_gym.envs.caster_track:CasterTrackVectorEnv",
+    entry_point="caster_gym:CasterTrackEnv",
+    vector_entry_point="caster_gym:CasterTrackVectorEnv",
 )
 register(
     id="CasterFollow-v0",
-    entry_point="caster_gym.envs.caster_follow:CasterFollowEnv",
-    vector_entry_point="caster_gym.envs.caster_follow:CasterFollowVectorEnv",
+    entry_point="caster_gym:CasterFollowEnv",
+    vector_entry_point="caster_gym:CasterFollowVectorEnv",
 )
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _HOMES and name not in _MODULES:
         raise AttributeError(f"module 'caster_gym' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    try:
+        found = import_module(f"caster_gym.{name}") if name in _MODULES else getattr(import_module(_HOMES[name]), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("caster_gym"):
+            raise
+        raise ImportError(
+            f"caster_gym.{name} needs {error.name}, which the core does without: pip install 'caster_gym[train]'"
+        ) from error
+    globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:
-    parts = (name for name, it in globals().items() if name.startswith("__") or isinstance(it, ModuleType))
-    return sorted({*parts, *__all__})
+    return sorted({*(name for name in globals() if name.startswith("__")), *__all__})

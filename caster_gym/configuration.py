@@ -46,7 +46,13 @@ class Frozen(BaseModel):
 
 
 class ConfigurationError(ValueError):
-    """A configuration that cannot be used; the message names the key, the value and what would be right."""
+    """A configuration that cannot be used; the message names the key, the value and what would be right.
+
+    >>> import caster_gym
+    >>> caster_gym.load_robot("chung2009")
+    Traceback (most recent call last):
+    caster_gym.configuration.ConfigurationError: unknown robot 'chung2009'; known are chung2008, tidybot2, ...
+    """
 
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -29,7 +29,15 @@ class Patch(Frozen):
 
 
 class Floor(Frozen):
-    """A floor of finite friction. Without one the floor grips: wheels roll and never slip."""
+    """A floor of finite friction. Without one the floor grips: wheels roll and never slip.
+
+    >>> import caster_gym, numpy as np
+    >>> model = caster_gym.Model(caster_gym.load_robot("chung2008"))
+    >>> ice = caster_gym.Floor(friction=0.05)
+    >>> states = model.simulate(np.zeros(9), [0.1, 0, 0.1, 0, 0.1, 0], dt=0.005, steps=200, floor=ice)
+    >>> float(states[-1, 3].round(2))  # vx [m/s] after 1 s: friction · gravity · time, since all wheels spin
+    0.49
+    """
 
     usual_names: ClassVar[Mapping[str, str]] = {
         "mu": "friction",

@@ -141,7 +141,15 @@ class Platform(Frozen):
 
 
 class Robot(Frozen):
-    """An omnidirectional robot on two or more powered casters."""
+    """An omnidirectional robot on two or more powered casters.
+
+    >>> import caster_gym
+    >>> robot = caster_gym.load_robot("chung2008")
+    >>> robot.caster_count, robot.platform.mass, robot.joints[:2]
+    (3, 5.0, ('roll_1', 'steer_1'))
+    >>> robot.with_actuation(["roll_1", "steer_1", "roll_2"]).driven
+    ('roll_1', 'steer_1', 'roll_2')
+    """
 
     usual_names: ClassVar[Mapping[str, str]] = {
         "mu": "floor_friction",
@@ -267,7 +275,15 @@ def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tupl
 
 
 def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
-    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one."""
+    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one.
+
+    >>> import caster_gym
+    >>> caster_gym.load_robot("tidybot2").caster_count
+    4
+    >>> changed = {**caster_gym.load_robot("chung2008").model_dump(), "name": "slippery", "floor_friction": 0.2}
+    >>> caster_gym.load_robot(changed).floor_friction
+    0.2
+    """
     if isinstance(name, Robot):
         return name
     if isinstance(name, Mapping):

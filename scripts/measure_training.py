@@ -36,8 +36,8 @@ from caster_gym.agents.learning.agent_settings import (
     SHACSettings,
     read_agent,
 )
-from caster_gym.agents.learning.bundle import load_bundle
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.bundle import load_policy
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import learn_with_sb3, make_learner
 from caster_gym.agents.learning.shac import ShortHorizon, learn_through_simulator, make_task
 from caster_gym.agents.learning.training_run import Run
@@ -62,7 +62,7 @@ ROUNDS = 3  # likewise
 class FreeVecEnv(VecEnv):
     """Robots of the same shapes as a batch's that cost nothing: what they answer was drawn beforehand."""
 
-    def __init__(self, like: CasterVecEnv, longest: int) -> None:
+    def __init__(self, like: SB3VecEnv, longest: int) -> None:
         self.render_mode = None
         super().__init__(like.num_envs, like.observation_space, like.action_space)
         rng = np.random.default_rng(0)
@@ -159,7 +159,7 @@ def empty_cache() -> Iterator[None]:
 
 def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
     """PPO on our robots and on free ones, with the same settings."""
-    ours = CasterVecEnv(training_batch(task, settings.robots))
+    ours = SB3VecEnv(training_batch(task, settings.robots))
     longest = round(float(np.mean(bare(ours.batch).engine.plan.guide.spans[:, 2])))
     free, round_ = FreeVecEnv(ours, longest), settings.robots * settings.horizon
     return [
@@ -170,7 +170,7 @@ def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
 
 def beside_others(task: TaskSettings, settings: PPOSettings) -> Beside:
     """PPO on our robots with one thread and with two, beside busy processes."""
-    environment = CasterVecEnv(training_batch(task, settings.robots))
+    environment = SB3VecEnv(training_batch(task, settings.robots))
     return train_beside(make_learner(settings, environment, seed=0), settings.robots * settings.horizon)
 
 
@@ -196,7 +196,7 @@ def train_timed(name: str, task: TaskSettings, settings: LearnedSettings, seed: 
         timed = TimedRun(Path(folder), task, settings, seed, bar)
         way_of_learning(settings)(timed, settings)
         timed.logger.close()
-        return Course(name, seed, tuple(timed.points), trials(task, load_bundle(Path(folder) / "best").agent))
+        return Course(name, seed, tuple(timed.points), trials(task, load_policy(Path(folder) / "best").agent))
 
 
 def trials(task: TaskSettings, agent: Agent) -> tuple[Trial, ...]:

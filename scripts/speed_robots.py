@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from caster_gym import Robot
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.arena import Arena, distances
 from caster_gym.arena.arena import Pillar
 from caster_gym.arena.packing import surroundings
@@ -115,7 +115,7 @@ def engine(robot: str, count: int) -> Work:
 def for_sb3(robot: str, count: int) -> Work:
     """The native batch as SB3 sees it."""
     native = CasterTrackVectorEnv(count, robot, autoreset_mode=AutoresetMode.SAME_STEP, corridor=WIDE)
-    environment = CasterVecEnv(native)
+    environment = SB3VecEnv(native)
     environment.reset()
     return cycled(environment.step, drawn_actions(native.action_space), count)
 

@@ -25,7 +25,7 @@ from caster_gym.agents.comparison.follow_metrics import FollowMetrics, FollowVer
 from caster_gym.agents.comparison.track_metrics import TrackMetrics, TrackVerdict, measure
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.agents.learning.agent_settings import ComputedTorqueSettings, read_agent
-from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.training_run import VALIDATION_SEED
 from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
 from caster_gym.configuration import ConfigurationError
@@ -114,7 +114,7 @@ def test_every_seed_is_trained_for_itself(finished):
     folder, _ = finished
     policies = sorted(file.parent for file in (folder / "policies").rglob("run.yaml"))
     assert len(policies) == len(SEEDS)
-    seeds = [load_bundle(policy / "best").description.trained_with["seed"] for policy in policies]
+    seeds = [load_policy(policy / "best").description.trained_with["seed"] for policy in policies]
     assert sorted(seeds) == SEEDS
     for policy in policies:
         history = read_history(policy, TrackVerdict)
@@ -127,7 +127,7 @@ def test_episodes_can_be_measured_again_from_the_policies(finished, settings, ta
     folder, _ = finished
     batch = test_batch(task, task.test, STARTS)
     for policy in (file.parent for file in (folder / "policies").rglob("run.yaml")):
-        bundle = load_bundle(policy / "best")
+        bundle = load_policy(policy / "best")
         metrics = measure(roll_out(bundle.agent, batch, settings.start_seed), settings.settling)
         seed = str(bundle.description.trained_with["seed"])
         written = [row for row in rows(folder / "episodes.csv") if row["seed"] == seed]
@@ -248,7 +248,7 @@ def test_following_is_compared_in_the_same_way(tmp_path):
     policy = folder / "policies" / "ppo-2"
     history = read_history(policy, FollowVerdict)
     assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
-    best = load_bundle(policy / "best").description
+    best = load_policy(policy / "best").description
     assert (best.environment, best.wrappers, best.actions) == ("follow", (), 6)
 
 

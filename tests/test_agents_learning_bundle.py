@@ -13,8 +13,8 @@ from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.learning import bundle as module
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.agent_settings import PPOSettings, SACSettings
-from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_bundle, save_bundle
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_policy, save_bundle
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import actor_of, make_learner
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
@@ -78,7 +78,7 @@ def test_a_policy_acts_after_loading_as_before_saving(tmp_path, squash):
     """To the last bit, in single actions and in whole episodes."""
     before = fresh_bundle(squash=squash)
     save_bundle(tmp_path / "policy", before)
-    after = load_bundle(tmp_path / "policy")
+    after = load_policy(tmp_path / "policy")
     assert after.description == before.description
     assert after.agent.name == before.agent.name == "PPO"
     assert_array_equal(after.agent.act(observations()), before.agent.act(observations()))
@@ -113,7 +113,7 @@ def test_the_actor_is_the_deterministic_policy_of_sb3(settings):
     SB3 rescales squashed actions to the bounds of the space and back, which rounds in float32.
     """
     batch = CasterTrackVectorEnv(4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor)
-    learner = make_learner(settings, CasterVecEnv(batch), seed=1)
+    learner = make_learner(settings, SB3VecEnv(batch), seed=1)
     seen = observations()
     expected, _ = learner.predict(seen, deterministic=True)
     actions = fresh_bundle().agent.act(seen)
@@ -130,7 +130,7 @@ def test_the_actor_keeps_weights_of_its_own():
     """Later training does not change a policy that was kept."""
     settings = PPOSettings(algorithm="ppo", hidden=HIDDEN, robots=4, horizon=8, batch=32)
     batch = CasterTrackVectorEnv(4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor)
-    learner = make_learner(settings, CasterVecEnv(batch), seed=1)
+    learner = make_learner(settings, SB3VecEnv(batch), seed=1)
     actor = actor_of(learner, settings)
     kept = {name: tensor.clone() for name, tensor in actor.state_dict().items()}
     with torch.no_grad():
@@ -155,7 +155,7 @@ def test_pickled_weights_are_refused_and_run_nothing(tmp_path, write):
     with (folder / WEIGHTS).open("wb") as file:
         write(Trap(mark), file)
     with pytest.raises(ConfigurationError, match=r"weights\.safetensors holds no weights"):
-        load_bundle(folder)
+        load_policy(folder)
     assert not mark.exists()
 
 
@@ -166,17 +166,17 @@ def test_python_tags_in_the_description_are_refused_and_run_nothing(tmp_path):
     assert "os.system" in text
     (folder / DESCRIPTION).write_text(text, encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"policy\.yaml cannot be read as YAML"):
-        load_bundle(folder)
+        load_policy(folder)
     assert not mark.exists()
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match=r"there is no folder '.*nowhere' of a policy"):
-        load_bundle(tmp_path / "nowhere")
+        load_policy(tmp_path / "nowhere")
     folder = saved(tmp_path)
     (folder / WEIGHTS).unlink()
     with pytest.raises(ConfigurationError, match=r"there is no file '.*weights\.safetensors'"):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 def test_a_policy_without_a_task_is_refused(tmp_path):
@@ -185,7 +185,7 @@ def test_a_policy_without_a_task_is_refused(tmp_path):
     del content["task"]
     (folder / DESCRIPTION).write_text(yaml.safe_dump(content), encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"policy\.yaml: 'task' is missing"):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 @pytest.mark.parametrize("version", [2, 0, "1", None, True, [1]])
@@ -193,14 +193,14 @@ def test_another_format_is_refused(tmp_path, version):
     folder = saved(tmp_path)
     change_description(folder, format=version)
     with pytest.raises(ConfigurationError, match=r"'?format'?.* (reads 1|should be)"):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 def test_an_unknown_key_is_named(tmp_path):
     folder = saved(tmp_path)
     change_description(folder, sqash="clip")
     with pytest.raises(ConfigurationError, match=r"policy\.yaml: unknown key 'sqash'; did you mean 'squash'\?"):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 @pytest.mark.parametrize(
@@ -219,14 +219,14 @@ def test_weights_that_do_not_fit_are_named(tmp_path, change, message):
     folder = saved(tmp_path)
     change_weights(folder, change)
     with pytest.raises(ConfigurationError, match=message):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 def test_layers_that_do_not_fit_the_weights_are_refused(tmp_path):
     folder = saved(tmp_path)
     change_description(folder, hidden=[16, 9])
     with pytest.raises(ConfigurationError, match=r"weight 'head\.weight' must be \(6, 9\)"):
-        load_bundle(folder)
+        load_policy(folder)
 
 
 def test_a_bundle_replaces_the_one_that_was_there_whole(tmp_path):
@@ -235,7 +235,7 @@ def test_a_bundle_replaces_the_one_that_was_there_whole(tmp_path):
     save_bundle(folder, fresh_bundle(seed=2))
     assert sorted(file.name for file in folder.iterdir()) == [DESCRIPTION, WEIGHTS]
     assert [one.name for one in tmp_path.iterdir()] == ["policy"]
-    assert_array_equal(load_bundle(folder).agent.act(observations()), fresh_bundle(seed=2).agent.act(observations()))
+    assert_array_equal(load_policy(folder).agent.act(observations()), fresh_bundle(seed=2).agent.act(observations()))
 
 
 @pytest.mark.parametrize("failing", ["save_file", "yaml"])
@@ -254,7 +254,7 @@ def test_a_failure_while_saving_leaves_the_old_bundle(tmp_path, monkeypatch, fai
             save_bundle(target, fresh_bundle(seed=2))
     assert [one.name for one in tmp_path.iterdir()] == ["policy"]
     monkeypatch.undo()
-    assert_array_equal(load_bundle(folder).agent.act(observations()), fresh_bundle(seed=1).agent.act(observations()))
+    assert_array_equal(load_policy(folder).agent.act(observations()), fresh_bundle(seed=1).agent.act(observations()))
 
 
 def test_a_policy_is_refused_where_it_cannot_act():
@@ -302,7 +302,7 @@ def test_a_policy_with_features_is_read_back(tmp_path):
     """Here three speeds of the platform instead of six torques."""
     before = fresh_bundle(wrappers=(TwistCommands(),), actions=3)
     save_bundle(tmp_path / "policy", before)
-    after = load_bundle(tmp_path / "policy")
+    after = load_policy(tmp_path / "policy")
     assert after.description == before.description
     assert after.agent.act(observations(4)).shape == (4, 3)
     assert_array_equal(after.agent.act(observations()), before.agent.act(observations()))

@@ -11,7 +11,7 @@ from gymnasium.error import DependencyNotInstalled
 from rsl_rl.env import VecEnv
 
 from caster_gym.agents.learning.agent_settings import RslPPOSettings, read_agent
-from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.rsl_rl import RslVecEnv, actor_of, make_runner
 from caster_gym.agents.learning.training import train
 from caster_gym.agents.settings import TaskSettings
@@ -110,13 +110,13 @@ def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
     assert parse(RslPPOSettings, facts["agent"], "run.yaml") == SETTINGS
     assert facts["completed"] is True
     assert [one["steps"] for one in facts["validations"]] == [12, 24]
-    bundle = load_bundle(tmp_path / "best")
+    bundle = load_policy(tmp_path / "best")
     assert bundle.description.name == "RSL_PPO"
     assert bundle.description.trained_with["steps"] == best.steps
     again = train(task(), SETTINGS, SEED, tmp_path / "again", lambda steps, verdict: None, threads=1)
     assert again.verdict == best.verdict
     observations = np.random.default_rng(0).normal(size=(5, bundle.description.layout.size)).astype(np.float32)
-    other = load_bundle(tmp_path / "again" / "best")
+    other = load_policy(tmp_path / "again" / "best")
     np.testing.assert_array_equal(bundle.agent.act(observations), other.agent.act(observations))
 
 

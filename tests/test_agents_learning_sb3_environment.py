@@ -14,7 +14,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import Tolerance, wrap
 
@@ -36,7 +36,7 @@ def native(longest=LONGEST, **task):
     batch = CasterTrackVectorEnv(
         COUNT, autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=longest, **{**TASK, **task}
     )
-    return CasterVecEnv(batch)
+    return SB3VecEnv(batch)
 
 
 def dummy():
@@ -203,7 +203,7 @@ def test_seeds_are_used_once():
 
 def test_other_ways_of_resetting_are_refused():
     with pytest.raises(ValueError, match=r"SB3 needs AutoresetMode.SAME_STEP, got AutoresetMode.NEXT_STEP"):
-        CasterVecEnv(CasterTrackVectorEnv(2, **TASK))
+        SB3VecEnv(CasterTrackVectorEnv(2, **TASK))
 
 
 def test_robots_of_a_batch_have_nothing_of_their_own():
@@ -221,7 +221,7 @@ def test_what_features_add_is_learned_from():
     """Rewards are shaped, and so are the returns that are told; attributes are still those of the batch."""
     bonus = Tolerance(quantity="position_error", margin=1.0, weight=10.0)
     plain = native(longest=4)
-    shaped = CasterVecEnv(wrap(native(longest=4).batch, bonus))
+    shaped = SB3VecEnv(wrap(native(longest=4).batch, bonus))
     assert shaped.get_attr("task") == plain.get_attr("task")
     assert shaped.actions == plain.actions == 6
     for env in (plain, shaped):

@@ -7,7 +7,7 @@ import yaml
 
 from caster_gym import load_robot
 from caster_gym.agents.learning.agent_settings import SHACSettings, read_agent
-from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.shac import Critic, ShortHorizon, Window, frozen, make_task, td_lambda
 from caster_gym.agents.learning.training import train
 from caster_gym.agents.settings import TaskSettings
@@ -200,7 +200,7 @@ def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
     facts = yaml.safe_load((tmp_path / "first" / "run.yaml").read_text(encoding="utf-8"))
     assert parse(SHACSettings, facts["agent"], "run.yaml") == settings
     assert [one["steps"] for one in facts["validations"]] == [12, 24]
-    first, again = (load_bundle(tmp_path / name / "best") for name in ("first", "again"))
+    first, again = (load_policy(tmp_path / name / "best") for name in ("first", "again"))
     assert (first.description.name, first.description.squash) == ("SHAC", "tanh")
     assert first.description.trained_with["steps"] == best.steps
     observations = np.random.default_rng(0).normal(size=(5, first.description.layout.size)).astype(np.float32)

@@ -13,7 +13,7 @@ from caster_gym.agents.comparison import evaluation
 from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.comparison.track_metrics import TrackVerdict, measure
 from caster_gym.agents.learning.agent_settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings, read_agent
-from caster_gym.agents.learning.bundle import load_bundle
+from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.training import train
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.configuration import parse
@@ -54,7 +54,7 @@ def rows(path):
 
 
 def weights(folder):
-    return load_bundle(folder).agent.actor.state_dict()
+    return load_policy(folder).agent.actor.state_dict()
 
 
 def same(first, second):
@@ -75,7 +75,7 @@ def test_a_run_leaves_everything_behind(tmp_path, settings):
     merits = [(int(row["failures"]), float(row["position_rmse"])) for row in history]
     assert (best.verdict.failures, best.verdict.position_rmse) == min(merits)
     assert same(weights(tmp_path / "best"), weights(tmp_path / "checkpoints" / f"{best.steps:010d}"))
-    assert load_bundle(tmp_path / "best").description.trained_with["steps"] == best.steps
+    assert load_policy(tmp_path / "best").description.trained_with["steps"] == best.steps
     assert rows(tmp_path / "progress.csv")
     assert list(tmp_path.glob("events.out.tfevents.*"))
     assert [step for step, _ in reports] == sorted(step for step, _ in reports)
@@ -161,7 +161,7 @@ def test_an_interruption_keeps_what_was_learned(tmp_path):
         run(tmp_path, report=interrupt)
     facts = yaml.safe_load((tmp_path / "run.yaml").read_text(encoding="utf-8"))
     assert facts["completed"] is False
-    bundle = load_bundle(tmp_path / "best")
+    bundle = load_policy(tmp_path / "best")
     assert PPO.steps // 4 <= bundle.description.trained_with["steps"] < PPO.steps
     assert [int(row["steps"]) for row in rows(tmp_path / "validation.csv")] == [
         bundle.description.trained_with["steps"]
@@ -179,7 +179,7 @@ def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     settings = read_agent("ppo", {"steps": 600_000, "validations": 3})
     train(task, settings, 0, tmp_path, nothing)
     batch = evaluation.test_batch(task, task.test, starts=1)
-    episodes = roll_out(load_bundle(tmp_path / "best").agent, batch, HELD_OUT_SEED)
+    episodes = roll_out(load_policy(tmp_path / "best").agent, batch, HELD_OUT_SEED)
     metrics = measure(episodes, 2.0)
     assert metrics.failed.size == 64
     assert metrics.failed.sum() <= 2

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.wrappers import RecordEpisodeStatistics
 
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, MotorLag, Payload, Potential, Pushes, SensorNoise, Smoothness, wrap
@@ -143,7 +143,7 @@ def test_copies_share_the_tables_of_paths():
 
 
 def test_the_environment_of_sb3_is_copied_with_its_batch():
-    env = CasterVecEnv(CasterTrackVectorEnv(3, autoreset_mode="SameStep", **TASK))
+    env = SB3VecEnv(CasterTrackVectorEnv(3, autoreset_mode="SameStep", **TASK))
     env.seed(2)
     env.reset()
     actions = np.full((3, 6), 0.3, dtype=np.float32)

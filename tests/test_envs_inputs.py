@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
@@ -155,7 +155,7 @@ def test_parts_of_steps_are_refused(steps):
         CasterFollowVectorEnv,
         TorchVectorEnv,
         lambda **given: TorchTask("follow", fields=given),
-        lambda **given: CasterVecEnv(CasterTrackVectorEnv(1, autoreset_mode="SameStep"), **given),
+        lambda **given: SB3VecEnv(CasterTrackVectorEnv(1, autoreset_mode="SameStep"), **given),
         lambda **given: gym.make("caster_gym:CasterTrack-v0", **given),
         lambda **given: gym.make_vec("caster_gym:CasterFollow-v0", num_envs=2, **given),
     ],

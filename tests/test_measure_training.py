@@ -10,7 +10,7 @@ import yaml
 
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.comparison.track_metrics import TrackVerdict
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import make_learner
 from caster_gym.agents.settings import TaskSettings
 from caster_gym.configuration import parse
@@ -43,7 +43,7 @@ def one_thread():
 
 
 def test_free_robots_answer_with_the_shapes_and_types_of_ours():
-    ours = CasterVecEnv(training_batch(TASK, 3))
+    ours = SB3VecEnv(training_batch(TASK, 3))
     free = FreeVecEnv(ours, longest=2)
     actions = np.zeros((3, 6), dtype=np.float32)
     answers = [[environment.reset(), *environment.step(actions)[:3]] for environment in (ours, free)]
@@ -53,7 +53,7 @@ def test_free_robots_answer_with_the_shapes_and_types_of_ours():
 
 
 def test_episodes_of_free_robots_end_by_time():
-    free = FreeVecEnv(CasterVecEnv(training_batch(TASK, 2)), longest=3)
+    free = FreeVecEnv(SB3VecEnv(training_batch(TASK, 2)), longest=3)
     free.reset()
     ends = [free.step(np.zeros((2, 6), dtype=np.float32)) for _ in range(6)]
     assert [done.tolist() for _, _, done, _ in ends] == 2 * [[False] * 2, [False] * 2, [True] * 2]
@@ -82,7 +82,7 @@ def test_training_is_measured_in_pairs_beside_busy_processes(monkeypatch):
     popen = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *one, **more: started.append(popen(*one, **more)) or started[-1])
     settings = read_learner("ppo", {}).model_copy(update={"robots": 2, "horizon": 8, "batch": 8, "hidden": (4,)})
-    environment = CasterVecEnv(training_batch(TASK, 2))
+    environment = SB3VecEnv(training_batch(TASK, 2))
     beside = train_beside(make_learner(settings, environment, seed=0), periods=16, pairs=2)
     assert sorted(one.threads for one in beside.rounds) == [1, 1, 2, 2]
     assert {one.threads for one in beside.rounds[:2]} == {1, 2}

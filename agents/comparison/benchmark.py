@@ -20,7 +20,7 @@ from caster_gym.agents.comparison.track_metrics import TrackVerdict
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.agents.learning.agent_settings import AgentSettings, ComputedTorqueSettings, LearnedSettings, read_agent
-from caster_gym.agents.learning.bundle import DESCRIPTION, load_bundle
+from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
 from caster_gym.agents.learning.training import train
 from caster_gym.agents.learning.training_run import Validation, verdict_on
 from caster_gym.agents.settings import BenchmarkSettings, TaskSettings, in_brief
@@ -98,7 +98,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
         if name in model_based:
             contenders.append(Contender(model_based[name][0].name, model_based[name][0], None))
         for job in (job for job in jobs if job.agent is agent):
-            learned = load_bundle(job.folder / "best").agent
+            learned = load_policy(job.folder / "best").agent
             alone = sum(other.algorithm == job.agent.algorithm for other in agents.values()) == 1
             contenders.append(Contender(learned.name if alone else name, learned, job.seed))
     with limited_to(threads):
@@ -176,7 +176,7 @@ def ready_agent(name: str, settings: TaskSettings, batch: Batch) -> Agent:
             f"agent {name!r} must be trained first: `caster-gym train {name} --out RUN` writes its policy to RUN/best, "
             "which is the folder to give"
         )
-    bundle, plain = load_bundle(folder), bare(batch)
+    bundle, plain = load_policy(folder), bare(batch)
     bundle.check_fits(plain.engine.layout, plain.task.control_period, settings.wrappers)
     return bundle.agent
 

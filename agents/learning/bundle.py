@@ -10,8 +10,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import torch
 import yaml
+from numpy.typing import NDArray
 from pydantic import PositiveInt
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
@@ -54,11 +56,38 @@ class PolicyDescription(ChosenTask):
 
 
 class Bundle:
-    """A learned agent together with its description."""
+    """A learned policy together with its description; it acts as every `Agent` does, and as models of SB3 do."""
 
     def __init__(self, description: PolicyDescription, actor: Actor) -> None:
         self.description = description
         self.agent = LearnedAgent(actor, description.name)
+
+    @property
+    def name(self) -> str:
+        """Name of the algorithm, or what the description says."""
+        return self.agent.name
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (robots, driven joints) in −1 … 1 for observations (robots, size)."""
+        return self.agent.act(observations)
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: tuple[NDArray[Any], ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], tuple[NDArray[Any], ...] | None]:
+        """Actions for one observation (size,) or several (robots, size), and the state as it was given.
+
+        The signature is that of Stable-Baselines3. A bundle has no memory and no noise: the state is not used, and
+        deterministic=False is refused.
+        """
+        if not deterministic:
+            raise ValueError("a saved policy acts without noise: deterministic must be True, got False")
+        several = observation[None] if observation.ndim == 1 else observation
+        actions = self.act(several)
+        return (actions[0] if observation.ndim == 1 else actions), state
 
     def check_fits(self, layout: ObservationLayout, period: float, features: Sequence[Feature] = ()) -> None:
         """Raises ValueError if the policy cannot act on observations of that layout, every period [s].
@@ -117,8 +146,23 @@ def save_bundle(folder: Path, bundle: Bundle) -> None:
         shutil.rmtree(fresh, ignore_errors=True)
 
 
-def load_bundle(folder: Path) -> Bundle:
-    """Read a bundle. Raises ConfigurationError that says what is missing or does not fit."""
+def load_policy(folder: str | Path) -> Bundle:
+    """A policy from the folder that training wrote: what it was trained for, and how to act.
+
+    Reading runs no code, so that folders from strangers are safe to load: the weights are safetensors, the description
+    is YAML that is checked. `description` holds robot, task, settings and versions. `act` takes observations
+    (robots, size) and returns actions (robots, driven joints) in −1 … 1, float32; `predict` has the signature of
+    Stable-Baselines3. Raises ConfigurationError that says what is missing or does not fit.
+
+    >>> import caster_gym, gymnasium
+    >>> policy = caster_gym.load_policy("runs/ppo/best")  # which `caster-gym train ppo --out runs/ppo` writes
+    >>> task = policy.description.task.model_dump()
+    >>> batch = gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16, **task)
+    >>> observations, infos = batch.reset(seed=0)
+    >>> policy.act(observations).shape, policy.predict(observations[0])[0].shape
+    ((16, 6), (6,))
+    """
+    folder = Path(folder)
     if not (folder / DESCRIPTION).is_file():
         raise ConfigurationError(_no_policy(folder))
     content = read_yaml(folder / DESCRIPTION)

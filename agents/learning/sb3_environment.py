@@ -13,11 +13,18 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from caster_gym.agents.comparison.evaluation import Batch, bare
 
 
-class CasterVecEnv(VecEnv):
+class SB3VecEnv(VecEnv):
     """A batch of robots with SB3's conventions: same-step reset, one info dictionary per robot.
 
     Infos hold what SB3 needs, at the end of episodes only: `terminal_observation`, `TimeLimit.truncated`, and `episode`
     with its return `r`, length `l`, mean position error and failure. All quantities are in `last_infos` as arrays.
+
+    >>> import caster_gym, gymnasium
+    >>> from stable_baselines3 import PPO
+    >>> batch = gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16, autoreset_mode="SameStep")
+    >>> model = PPO("MlpPolicy", caster_gym.SB3VecEnv(batch), n_steps=4, batch_size=64, n_epochs=1, device="cpu")
+    >>> model.learn(total_timesteps=64).num_timesteps
+    64
     """
 
     def __init__(self, batch: Batch) -> None:

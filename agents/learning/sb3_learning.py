@@ -10,11 +10,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.agent_settings import Learner, PPOSettings, SACSettings
-from caster_gym.agents.learning.sb3_environment import CasterVecEnv
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.training_run import Run
 
 
-def make_learner(settings: PPOSettings | SACSettings, environment: CasterVecEnv, seed: int) -> BaseAlgorithm:
+def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, seed: int) -> BaseAlgorithm:
     """A fresh SB3 algorithm."""
     rate = settings.learning_rate
     schedule = (lambda remaining: rate * max(remaining, 0.0)) if settings.falling else rate
@@ -90,7 +90,7 @@ class Watcher(BaseCallback):
 
 def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
     """Train on the native batch of NumPy arrays."""
-    learner = make_learner(settings, CasterVecEnv(training_batch(run.task, settings.robots)), run.seed)
+    learner = make_learner(settings, SB3VecEnv(training_batch(run.task, settings.robots)), run.seed)
     learner.set_logger(run.logger)
     try:
         learner.learn(settings.steps, callback=Watcher(run))

@@ -130,7 +130,15 @@ class Beside(Frozen):
 
 
 class Arena(Frozen):
-    """What is in the way, and how the robot bounces off it."""
+    """What is in the way, and how the robot bounces off it.
+
+    >>> import caster_gym, gymnasium
+    >>> pillar = {"centre": [0.0, 1.5], "radius": 0.1}
+    >>> arena = caster_gym.Arena(room=[[-2, -2], [2, 2]], pillars=[pillar], restitution=0.3)
+    >>> arena.obstacles[-1][0]
+    'pillar 1 at (0, 1.5) m'
+    >>> env = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate", arena=arena)
+    """
 
     usual_names: ClassVar[Mapping[str, str]] = {
         "mu": "friction",

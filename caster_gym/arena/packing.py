@@ -18,7 +18,16 @@ def hull_of(robot: Robot) -> Hull:
 
 
 def surroundings(robot: Robot, arena: Arena) -> Surroundings:
-    """A robot in an arena, as the engines take it."""
+    """A robot in an arena, as the engines take it.
+
+    >>> import caster_gym
+    >>> robot = caster_gym.load_robot("chung2008")
+    >>> around = caster_gym.surroundings(robot, caster_gym.Arena(pillars=[{"centre": [0.5, 0.0], "radius": 0.1}]))
+    >>> coasting = [0, 0, 0, 0.5, 0, 0, 0, 0, 0]  # at 0.5 m/s towards the pillar
+    >>> states = caster_gym.Model(robot).simulate(coasting, [0.0] * 6, dt=0.005, steps=200, around=around)
+    >>> float(states[-1, 3].round(3))  # vx [m/s] after the impact, of restitution 0.5
+    -0.25
+    """
     return Surroundings(hull_of(robot), pack([arena])[0])
 
 

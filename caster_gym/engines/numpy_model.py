@@ -37,6 +37,14 @@ class Model:
     dynamics="chung2008" leaves the term (D1) out of the bias, as that paper prints the model. parameters replaces the
     robot's own numbers, for instance by arrays with one value per robot of the batch.
     Source: docs/equations.md. Raises ValueError for arrays of the wrong last axis and for values that are not finite.
+
+    >>> import caster_gym, numpy as np
+    >>> model = caster_gym.Model(caster_gym.load_robot("chung2008"))
+    >>> model.inertia([0.0, 0.0, 0.0]).diagonal().round(3)  # all wheels ahead [kg, kg, kg m²]
+    array([7.55 , 5.421, 0.04 ])
+    >>> states = model.simulate(np.zeros(9), [0.1, 0, 0.1, 0, 0.1, 0], dt=0.005, steps=200)
+    >>> states.shape, states[-1, :3].round(3)  # 1 s later: x, y [m], β [rad]
+    ((201, 9), array([0.795, 0.   , 0.   ]))
     """
 
     _arrays: Any = np

@@ -54,6 +54,13 @@ class CasterFollowEnv(CasterEnv):
 
     robot, path, actuation, arena, render_mode: as for `CasterTrackEnv`; of a path only its geometry and headings count.
     All other keywords are fields of `caster_gym.envs.follow_task.FollowTask`, which holds the numbers above.
+
+    >>> import caster_gym, gymnasium
+    >>> env = gymnasium.make("caster_gym:CasterFollow-v0", path="lemniscate")
+    >>> observation, info = env.reset(seed=0)
+    >>> observation, reward, terminated, truncated, info = env.step(0.1 * env.action_space.high)
+    >>> observation.shape, round(reward, 3), round(info["progress"], 3)  # [m]
+    ((55,), 0.798, 0.007)
     """
 
     def __init__(
@@ -73,6 +80,13 @@ class CasterFollowVectorEnv(CasterVectorEnv):
 
     max_episode_steps truncates episodes earlier. All other arguments are those of `CasterFollowEnv`; seeds, autoreset
     modes and options are those of `CasterVectorEnv`.
+
+    >>> import caster_gym, gymnasium
+    >>> batch = gymnasium.make_vec("caster_gym:CasterFollow-v0", num_envs=16, path="lemniscate")
+    >>> observations, infos = batch.reset(seed=0)
+    >>> observations, rewards, terminated, truncated, infos = batch.step(batch.action_space.sample())
+    >>> observations.shape, rewards.shape, infos["progress"].shape
+    ((16, 55), (16,), (16,))
     """
 
     def __init__(

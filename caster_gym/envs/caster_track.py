@@ -104,6 +104,13 @@ class CasterTrackEnv(CasterEnv):
     "all" or the names of the driven joints; by default the robot's own. arena: obstacles (`caster_gym.arena`).
     render_mode: "human" or "rgb_array". All other keywords are fields of
     `caster_gym.envs.track_task.TrackTask`, which holds the numbers above; unknown ones are errors.
+
+    >>> import caster_gym, gymnasium
+    >>> env = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> observation, info = env.reset(seed=0)
+    >>> observation, reward, terminated, truncated, info = env.step(0.1 * env.action_space.high)
+    >>> observation.shape, round(reward, 3), round(info["position_error"], 3)  # [m]
+    ((46,), 0.532, 0.051)
     """
 
     def __init__(
@@ -123,6 +130,13 @@ class CasterTrackVectorEnv(CasterVectorEnv):
 
     max_episode_steps truncates episodes before their trajectory ends. All other arguments are those of
     `CasterTrackEnv`; seeds, autoreset modes and options are those of `CasterVectorEnv`.
+
+    >>> import caster_gym, gymnasium
+    >>> batch = gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16, path="lemniscate")
+    >>> observations, infos = batch.reset(seed=0)
+    >>> observations, rewards, terminated, truncated, infos = batch.step(batch.action_space.sample())
+    >>> observations.shape, rewards.shape, infos["position_error"].shape
+    ((16, 46), (16,), (16,))
     """
 
     def __init__(

@@ -24,6 +24,13 @@ class ObservationLayout:
     Agents that need physical quantities decode them from the observation: nobody sees more than anybody else.
     preview: how far ahead the reference is shown, in seconds ("s") or metres along the path ("m"). nearest: number of
     obstacles shown.
+
+    >>> import caster_gym, gymnasium
+    >>> robot = caster_gym.load_robot("chung2008")
+    >>> layout = caster_gym.ObservationLayout(robot, preview=(0.1, 0.2, 0.4))  # as CasterTrack-v0 has it
+    >>> observation, info = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate").reset(seed=0)
+    >>> layout.size, layout.physical(observation, "position_error").shape  # ahead and left [m]
+    (46, (2,))
     """
 
     def __init__(

@@ -36,6 +36,11 @@ def mjcf(robot: Robot, time_step: float, friction: float = FRICTION, tips: bool 
     Motors take torques [N m] within their greatest; that these fall with speed is left to who drives them. time_step in
     s; friction between wheels and floor; tips: the platform is free, so that loads shift between the wheels as it
     accelerates. Raises ValueError for masses and inertias that no solid body can have.
+
+    >>> import caster_gym
+    >>> text = caster_gym.mjcf(caster_gym.load_robot("chung2008"), time_step=0.002)
+    >>> text.count("<motor "), text.splitlines()[0]
+    (6, '<mujoco model="chung2008">')
     """
     if not 0.0 < time_step < math.inf:
         raise ValueError(f"time_step must be positive and finite, got {time_step:g} s")

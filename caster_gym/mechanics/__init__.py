@@ -12,4 +12,18 @@ docs/equations.md, and each tag (K1), (D3), (C2) there stands on the line that c
     delta    steering rate, of the link relative to the platform      [rad/s]
     M        symmetric 3×3 matrix as (xx, xy, xz, yy, yz, zz)
     F        generalised force (fx, fy, moment) at C, in B            [N, N, N m]
+
+    >>> import caster_gym
+    >>> from caster_gym import mechanics
+    >>> numbers = mechanics.robot_parameters(caster_gym.load_robot("chung2008"))
+    >>> ahead, torques = ((1.0, 0.0),) * 3, ((0.1, 0.0),) * 3  # (cos δ, sin δ) and joint torques [N m] of each caster
+    >>> rate = mechanics.forward_dynamics((0.0, 0.0, 0.0), ahead, torques, (0.0, 0.0, 0.0), numbers)
+    >>> round(rate[0], 3)  # [m/s²]
+    1.589
 """
+
+from caster_gym.mechanics.dynamics import forward_dynamics, inertia, inverse_dynamics
+from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.mechanics.scalars import pairs, register
+
+__all__ = ["forward_dynamics", "inertia", "inverse_dynamics", "pairs", "register", "robot_parameters"]

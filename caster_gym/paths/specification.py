@@ -40,6 +40,12 @@ def read_paths(path: PathLike) -> tuple[AnyPath, ...]:
     shape and its parameters. A list or an array of points (x, y) [m] or (x, y, heading) [m, m, rad] is a spline; one of
     (time, x, y, heading) [s, m, m, rad], and a Trajectory, are timed. Raises ConfigurationError that names the shape,
     the key and the value.
+
+    >>> import caster_gym
+    >>> caster_gym.read_paths([(0, 0), (1, 0), (1, 1)])[0].shape
+    'spline'
+    >>> [path.shape for path in caster_gym.read_paths(["circle", {"shape": "lemniscate", "duration": 8.0}])]
+    ['circle', 'lemniscate']
     """
     if isinstance(path, get_args(AnyPath)):
         return (path,)
@@ -111,6 +117,12 @@ def build_trajectories(path: PathLike, robot: Robot, time_step: float) -> tuple[
     """The timed trajectories of all paths. Time step in s.
 
     Raises ValueError for one that the motors of the robot cannot drive; the message says what would do.
+
+    >>> import caster_gym
+    >>> robot = caster_gym.load_robot("chung2008")
+    >>> (trajectory,) = caster_gym.build_trajectories("lemniscate", robot, time_step=0.02)
+    >>> trajectory.duration, trajectory.samples.shape
+    (12.0, (601, 10))
     """
     built: list[Trajectory] = []
     for specification in read_paths(path):

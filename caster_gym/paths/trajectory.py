@@ -21,6 +21,14 @@ class Trajectory:
 
     samples (K + 1, 10), read-only, with columns COLUMNS: position [m], heading as a unit vector, velocity [m/s] and
     yaw rate [rad/s], acceleration [m/s²] and yaw acceleration [rad/s²], at the times 0, time_step, … K · time_step.
+
+    >>> import caster_gym, numpy as np
+    >>> t = np.arange(101) * 0.02  # [s]
+    >>> no, one = np.zeros(101), np.ones(101)
+    >>> columns = [0.1 * t**2, no, one, no, 0.2 * t, no, no, 0.2 * one, no, no]  # along x at 0.2 m/s²
+    >>> trajectory = caster_gym.Trajectory("straight", time_step=0.02, samples=np.stack(columns, axis=1))
+    >>> trajectory.duration
+    2.0
     """
 
     name: str

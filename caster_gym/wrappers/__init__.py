@@ -1,4 +1,11 @@
-"""What an environment can do differently, for one robot and for a batch: rewards, actions, sensors and plants."""
+"""Features of an environment, for one robot or a batch: other rewards, actions, sensors and plants.
+
+>>> import gymnasium
+>>> from caster_gym.wrappers import ActionDelay, SensorNoise, wrap
+>>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0"), ActionDelay(periods=1), SensorNoise(position=0.002))
+>>> observation, info = env.reset(seed=0)
+>>> batch = wrap(gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16), *env.features)  # the same for a batch
+"""
 
 from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistCommands
 from caster_gym.wrappers.environment import FeatureEnv, FeatureVectorEnv, wrap

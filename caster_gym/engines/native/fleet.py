@@ -177,6 +177,12 @@ class Fleet:
     floor: one of finite friction, on which wheels may slip, as the environments take it: a `caster_gym.floor.Floor` or
     a mapping. Then state (count, 9 + 4 N) goes on with η̇, θ̇ of each caster [rad/s] and the tilt that
     shifts loads [N m]; set to (count, 7 + 2 N), wheels start rolling without slip.
+
+    >>> import caster_gym, numpy as np
+    >>> fleet = caster_gym.Fleet(caster_gym.load_robot("chung2008"), count=1000)
+    >>> fleet.step(np.tile([0.1, 0.0], (1000, 3)), dt=0.005, steps=200)  # 0.1 N m at every rolling joint
+    >>> fleet.state.shape, fleet.state[0, :2].round(3)  # after 1 s: x, y [m]
+    ((1000, 13), array([0.795, 0.   ]))
     """
 
     def __init__(

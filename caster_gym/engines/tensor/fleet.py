@@ -46,6 +46,12 @@ class TorchFleet:
 
     Raises ValueError for another precision, a device that is not there, a batch that does not fit into its memory, and
     robots with different numbers of casters. Values are not checked for being finite, which would wait for the device.
+
+    >>> import caster_gym, torch
+    >>> fleet = caster_gym.TorchFleet(caster_gym.load_robot("chung2008"), count=1000)
+    >>> fleet.step(torch.tensor([0.1, 0.0] * 3).expand(1000, 6), dt=0.005, steps=20)
+    >>> fleet.state.shape, fleet.state[0, :2]  # after 0.1 s: x, y [m]
+    (torch.Size([1000, 13]), tensor([0.0079, 0.0000]))
     """
 
     def __init__(

@@ -16,6 +16,13 @@ class TorchModel(Model):
 
     parameters may hold tensors, so that gradients with respect to the robot's own numbers exist too. Values are not
     checked for being finite, since that would wait for the device.
+
+    >>> import caster_gym, torch
+    >>> model = caster_gym.TorchModel(caster_gym.load_robot("chung2008"))
+    >>> steering = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    >>> model.inertia(steering)[0, 1].backward()
+    >>> steering.grad  # of an element of the inertia matrix by the steering angles [kg/rad]
+    tensor([0.7097, 0.7097, 0.7097], dtype=torch.float64)
     """
 
     _arrays: Any = torch

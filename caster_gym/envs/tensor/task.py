@@ -103,6 +103,15 @@ class TorchTask:
     diagnostics, infos leave out traction use and conditioning, which take longer than everything else that is observed.
 
     parameters: the robot's own numbers, which may be replaced by others, or by tensors (robots,) of them.
+
+    >>> import caster_gym, torch
+    >>> task = caster_gym.TorchTask("track", path="lemniscate")
+    >>> state, outcome = task.begin(torch.arange(16))
+    >>> actions = torch.zeros(16, 6, requires_grad=True)
+    >>> state, outcome = task.step(state, actions)
+    >>> outcome.rewards.sum().backward()
+    >>> outcome.observations.shape, actions.grad.shape
+    (torch.Size([16, 46]), torch.Size([16, 6]))
     """
 
     def __init__(

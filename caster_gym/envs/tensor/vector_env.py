@@ -38,6 +38,13 @@ class TorchVectorEnv:
     compile fuses the step into few kernels; its first call then takes half a minute to a minute, or 10 s where Torch's
     cache on disk has it. On a CUDA device they are replayed as graphs, unless there are obstacles. On the CPU more than
     one of Torch's threads is faster only where nothing else keeps the cores busy. diagnostics: see `TorchTask`.
+
+    >>> import caster_gym, torch
+    >>> batch = caster_gym.TorchVectorEnv("track", num_envs=16, path="lemniscate", device="cpu")
+    >>> observations, infos = batch.reset(seed=0)
+    >>> observations, rewards, terminated, truncated, infos = batch.step(torch.zeros(16, 6))
+    >>> observations.shape, rewards.shape
+    (torch.Size([16, 46]), torch.Size([16]))
     """
 
     autoreset_mode = AutoresetMode.SAME_STEP
