@@ -23,7 +23,8 @@ from caster_gym.mechanics.floor import on_floor
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import pairs
-from caster_gym.mechanics.slip import rolling_state, slip_step
+from caster_gym.mechanics.slip import slip_step
+from caster_gym.mechanics.slip_state import rolling_state
 from caster_gym.report.figures import COLOURS, legend_below, new_figure
 from caster_gym.report.pages import join_parts, paragraph
 from caster_gym.report.provenance import command_line, versions_in_words

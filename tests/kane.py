@@ -130,19 +130,31 @@ class Kane:
         _, drift = jvp(lambda q: tuple(part @ twist for part in self._partial_velocities(q)), (q,), (move,))
         a, alpha, joint = (p @ twist_rate + e for p, e in zip(partial, drift, strict=True))
         omega = (partial[1] @ twist)[..., None]
+        return self.masses[:, None] * a, self._spin_rate(q, omega, alpha), self.spinning * joint
+
+    def _spin_rate(self, q: Tensor, omega: Tensor, alpha: Tensor) -> Tensor:
+        """Rate of change (2 N + 1, 3) of the spin of bodies that turn at omega (2 N + 1, 3, 1), in W."""
         tensors = self._inertia_tensors(q)
-        spin = tensors @ alpha[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1)
-        return self.masses[:, None] * a, spin[..., 0], self.spinning * joint
+        return (tensors @ alpha[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1))[..., 0]
+
+    def _summed_inertia(self, q: Tensor, v: Tensor, w: Tensor, joint: Tensor) -> Tensor:
+        """Inertia of all bodies, gears and rotors for the coordinates in which their velocities are given."""
+        moving = torch.einsum("b,bij,bik->jk", self.masses, v, v)
+        turning = torch.einsum("bij,bil,blk->jk", w, self._inertia_tensors(q), w)
+        return moving + turning + joint.T @ (self.spinning[:, None] * joint)
+
+    def _momentum(self, q: Tensor, v: Tensor, w: Tensor, fixed: Tensor) -> tuple[Tensor, Tensor]:
+        """Momentum (3,), and spin (3,) about a fixed point, of bodies with velocities (2 N + 1, 3)."""
+        linear = self.masses[:, None] * v
+        own = self._inertia_tensors(q) @ w[..., None]
+        return linear.sum(0), (torch.linalg.cross(self._places(q) - fixed, linear) + own[..., 0]).sum(0)
 
     # What comes out.
 
     def inertia(self, steering: np.ndarray) -> np.ndarray:
         """M (3, 3)."""
         q = self._coordinates(steering)
-        v, w, joint = self._partial_velocities(q)
-        moving = torch.einsum("b,bij,bik->jk", self.masses, v, v)
-        turning = torch.einsum("bij,bil,blk->jk", w, self._inertia_tensors(q), w)
-        return (moving + turning + joint.T @ (self.spinning[:, None] * joint)).numpy()
+        return self._summed_inertia(q, *self._partial_velocities(q)).numpy()
 
     def bias(self, steering: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """h (3,): the force that keeps the components of the twist constant without friction."""
@@ -160,7 +172,8 @@ class Kane:
     ) -> np.ndarray:
         """Twist rate (3,) under joint torques (2 N,) in the order roll_1, steer_1, …, friction and a wrench at C."""
         q = self._coordinates(steering)
-        force = self._partial(q).T @ self._applied(q, twist, torque, wrench)
+        move = self._partial(q) @ torch.as_tensor(twist)
+        force = self._partial(q).T @ self._applied(q, move, torque, wrench)
         return np.linalg.solve(self.inertia(steering), force.numpy() - self.bias(steering, twist))
 
     def contact_forces(
@@ -172,7 +185,8 @@ class Kane:
         momentum, spin, rotors = self._inertial(q, torch.as_tensor(twist), rate)
         velocity, turning = self._velocities(q)
         needed = torch.einsum("bin,bi->n", velocity, momentum) + torch.einsum("bin,bi->n", turning, spin)
-        needed = needed + self.spins.T @ rotors - self._applied(q, twist, torque, wrench)
+        move = self._partial(q) @ torch.as_tensor(twist)
+        needed = needed + self.spins.T @ rotors - self._applied(q, move, torque, wrench)
         force = torch.linalg.lstsq(self._contact_rows(q).T, needed[:, None]).solution.reshape(self.count, 2)
         _, f, left = self._points(q)
         return torch.stack(((force * f).sum(1), (force * left).sum(1)), -1).numpy()
@@ -191,9 +205,7 @@ class Kane:
 
         def momentum(q: Tensor, nu: Tensor) -> tuple[Tensor, Tensor]:
             v, w, _ = self._partial_velocities(q)
-            linear = self.masses[:, None] * (v @ nu)
-            own = self._inertia_tensors(q) @ (w @ nu)[..., None]
-            return linear.sum(0), (torch.linalg.cross(self._places(q) - fixed, linear) + own[..., 0]).sum(0)
+            return self._momentum(q, v @ nu, w @ nu, fixed)
 
         _, (force, moment) = jvp(momentum, (q, nu), (self._partial(q) @ nu, rate))
         back = _about_z(q[2:3])[0].T
@@ -204,9 +216,8 @@ class Kane:
         momentum, spin, rotors = inertial
         return torch.einsum("bij,bi->j", v, momentum) + torch.einsum("bij,bi->j", w, spin) + joint.T @ rotors
 
-    def _applied(self, q: Tensor, twist: np.ndarray, torque: np.ndarray, wrench: np.ndarray) -> Tensor:
-        """Generalised forces (n,) on q of torques, friction and wrench."""
-        move = self._partial(q) @ torch.as_tensor(twist)
+    def _applied(self, q: Tensor, move: Tensor, torque: np.ndarray, wrench: np.ndarray) -> Tensor:
+        """Generalised forces (n,) on q, which changes at the rates `move`, of torques, friction and wrench."""
         rate = self.joints @ move
         friction = self.viscous * rate + self.coulomb * rate / torch.sqrt(rate**2 + COULOMB_SPEED**2)
         given = torch.as_tensor(torque, dtype=torch.float64).reshape(self.count, 2).T.reshape(-1)

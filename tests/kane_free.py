@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.func import jvp
 
-from tests.kane import COULOMB_SPEED, Kane, _plane
+from tests.kane import Kane, _plane
 
 
 class FreeKane(Kane):
@@ -22,10 +22,7 @@ class FreeKane(Kane):
 
     def _masses_of(self, q: Tensor) -> Tensor:
         """Inertia matrix (n, n) of all coordinates."""
-        v, w = self._velocities(q)
-        moving = torch.einsum("b,bij,bik->jk", self.masses, v, v)
-        turning = torch.einsum("bij,bil,blk->jk", w, self._inertia_tensors(q), w)
-        return moving + turning + self.spins.T @ (self.spinning[:, None] * self.spins)
+        return self._summed_inertia(q, *self._velocities(q), self.spins)
 
     def _floor_rows(self, q: Tensor) -> Tensor:
         """Velocity (N, 2, n) of the wheels' material points at the floor along f and f⊥."""
@@ -86,9 +83,7 @@ class FreeKane(Kane):
 
         def spin(q: Tensor, move: Tensor) -> Tensor:
             v, w = self._velocities(q)
-            linear = self.masses[:, None] * (v @ move)
-            own = self._inertia_tensors(q) @ (w @ move)[..., None]
-            return (torch.linalg.cross(self._places(q) - fixed, linear) + own[..., 0]).sum(0)
+            return self._momentum(q, v @ move, w @ move, fixed)[1]
 
         _, moment = jvp(spin, (q, move), (move, self._second(q, move, torque, floor, wrench)))
         push = self.height * torch.as_tensor(wrench)[:2]
@@ -98,16 +93,7 @@ class FreeKane(Kane):
         """Second derivatives of q."""
         v0, w0 = self._velocities(q)
         _, (drift, turning) = jvp(lambda q: tuple(part @ move for part in self._velocities(q)), (q,), (move,))
-        tensors, omega = self._inertia_tensors(q), (w0 @ move)[..., None]
-        own = (tensors @ turning[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1))[..., 0]
+        own = self._spin_rate(q, (w0 @ move)[..., None], turning)
         bias = torch.einsum("bij,bi->j", v0, self.masses[:, None] * drift) + torch.einsum("bij,bi->j", w0, own)
-        joint = self.joints @ move
-        friction = self.viscous * joint + self.coulomb * joint / torch.sqrt(joint**2 + COULOMB_SPEED**2)
-        given = torch.as_tensor(torque, dtype=torch.float64).reshape(self.count, 2).T.reshape(-1)
-        push = torch.as_tensor(wrench, dtype=torch.float64)
-        outside = torch.cat((_plane(q[2]) @ push[:2], push[2:], torch.zeros(2 * self.count)))
         held = torch.einsum("nij,ni->j", self._floor_rows(q), torch.as_tensor(floor))
-        scrub = self.yaws.T @ (self.scrub * (self.yaws @ move))
-        return torch.linalg.solve(
-            self._masses_of(q), self.joints.T @ (given - friction) - scrub + outside + held - bias
-        )
+        return torch.linalg.solve(self._masses_of(q), self._applied(q, move, torque, wrench) + held - bias)

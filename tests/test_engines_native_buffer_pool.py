@@ -6,36 +6,36 @@ import gymnasium as gym
 import numpy as np
 import torch
 
-from caster_gym.engines.native.buffer_pool import KEPT, Shelf
+from caster_gym.engines.native.buffer_pool import KEPT, BufferPool
 
 STEPS = 20
 
 
 def test_an_array_comes_back_once_nobody_holds_it():
-    shelf = Shelf((3, 4), np.float32)
-    first = shelf.take()
+    pool = BufferPool((3, 4), np.float32)
+    first = pool.take()
     assert first.shape == (3, 4)
     assert first.dtype == np.float32
     place = first.ctypes.data
-    second = shelf.take()
+    second = pool.take()
     assert second.ctypes.data != place
     del first
-    assert shelf.take().ctypes.data == place
+    assert pool.take().ctypes.data == place
 
 
 def test_whatever_looks_at_an_array_keeps_it():
     """Views, views of views, tensors and buffers all hold the array they show."""
     for look in (lambda a: a[1], lambda a: a.T[:2].reshape(-1), torch.from_numpy, memoryview):
-        shelf = Shelf((2, 2), np.float64)
-        seen = look(shelf.take())
-        other = shelf.take()
+        pool = BufferPool((2, 2), np.float64)
+        seen = look(pool.take())
+        other = pool.take()
         other[:] = 7.0
         assert not np.shares_memory(other, np.asarray(seen))
 
 
-def test_who_keeps_many_arrays_does_not_make_the_shelf_keep_them():
-    shelf = Shelf((2, 2), np.float64)
-    held = [shelf.take() for _ in range(3 * KEPT)]
+def test_who_keeps_many_arrays_does_not_make_the_pool_keep_them():
+    pool = BufferPool((2, 2), np.float64)
+    held = [pool.take() for _ in range(3 * KEPT)]
     assert len({array.ctypes.data for array in held}) == 3 * KEPT
     spare = [weakref.ref(array) for array in held]
     held.clear()

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from caster_gym.envs.native import step as task_kernel  # noqa: F401  # teaches Numba the functions of randomness
-from caster_gym.envs.randomness import mix, uniform
+from caster_gym.envs.randomness import Words, mix_words, shifted, uniform
 
 GOLDEN = 0x9E3779B97F4A7C15
 DRAWS = 200_000
@@ -38,7 +38,8 @@ def test_mixing_gives_the_published_sequence():
         16408922859458223821,
     ]
     states = np.array([(1234567 + k * GOLDEN) % 2**64 for k in range(1, 6)], dtype=np.uint64)
-    assert [int(x) for x in mix(states)] == published
+    words = Words(*map(np.uint64, Words()))
+    assert [int(x) for x in mix_words(states, shifted, words)] == published
 
 
 def test_compiled_and_interpreted_numbers_are_the_same():

@@ -10,7 +10,7 @@ from caster_gym.mechanics.grip_or_slip import careful_step, free_step, noted_ste
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
-from caster_gym.mechanics.slip import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
 
 NOTHING = (0.0, 0.0, 0.0)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.mechanics.integration import State, pack_state, rk4_step, unit, unpack_state
+from caster_gym.mechanics.integration import State, pack_state, rk4_step, runge_kutta, unit, unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from tests.kane import Kane
 from tests.random_robots import frictionless, random_motion, random_robot
@@ -144,3 +144,11 @@ def test_packing_a_state_keeps_it():
     state = State((1.0, 2.0), (0.6, 0.8), (3.0, 4.0, 5.0), ((1.0, 0.0), (0.0, 1.0)))
     assert pack_state(state) == (1.0, 2.0, 0.6, 0.8, 3.0, 4.0, 5.0, 1.0, 0.0, 0.0, 1.0)
     assert unpack_state(pack_state(state)) == state
+
+
+def test_the_method_is_the_classical_one_of_fourth_order():
+    """y' = a y: a step multiplies by the first five terms of e^(a h), whatever kind of thing y is."""
+    for a, h in ((1.0, 0.3), (-2.0, 0.7), (1j, 1.1)):
+        after = runge_kutta(lambda y, rate: rate * y, lambda y, h, rate: y + h * rate, 1.0, h, (a,))
+        z = a * h
+        assert after == pytest.approx(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0, rel=1e-15)  # rounding

@@ -12,12 +12,8 @@ from caster_gym.mechanics.ground import platform_tilt
 from caster_gym.mechanics.integration import State, pack_state, rk4_step
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import each, pairs, total
-from caster_gym.mechanics.slip import (
-    rolling_state,
-    slip_step,
-    turned,
-    unpack_slip_state,
-)
+from caster_gym.mechanics.slip import slip_step
+from caster_gym.mechanics.slip_state import rolling_state, turned, unpack_slip_state
 from caster_gym.mechanics.slip_tilt import free_tilt
 from tests.kane_free import FreeKane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot

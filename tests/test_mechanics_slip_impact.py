@@ -15,7 +15,7 @@ from caster_gym.mechanics.grip_or_slip import impact
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.separation import Hull, Obstacles
-from caster_gym.mechanics.slip import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state
 from tests.kane_free import FreeKane
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")

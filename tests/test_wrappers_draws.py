@@ -4,8 +4,8 @@ import numpy as np
 from numpy.testing import assert_array_equal
 from scipy import stats
 
-from caster_gym.envs.randomness import uniform
-from caster_gym.wrappers.draws import normals, seeds_of, stream, uniforms
+from caster_gym.envs.randomness import uniform, uniforms
+from caster_gym.wrappers.draws import normals, seeds_of, stream
 
 KEYS = np.array([0, 1, 2**63, 2**64 - 1], dtype=np.uint64)
 EPISODES = np.array([0, 5, 2**40, 1], dtype=np.uint64)

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import Robot
@@ -41,7 +42,7 @@ def worst_conditioning(robot: Robot) -> tuple[float, tuple[float, ...]]:
     starts = samples[np.arange(len(samples)), model.conditioning(samples).argmin(axis=1)]
     ends = _descended(lambda steering: np.square(model.conditioning(steering)), starts)
     values = model.conditioning(ends)
-    worst = np.pi - (np.pi - ends[values.argmin()]) % (2.0 * np.pi)
+    worst = wrap_angle(ends[values.argmin()])
     return float(values.min()), tuple(worst.tolist())
 
 

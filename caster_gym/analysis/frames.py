@@ -4,6 +4,7 @@ A heading is the complex number e^{iβ}, as points of the plane are in `caster_g
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array, Plane
 
@@ -19,6 +20,11 @@ def rate_in_body(acceleration: Array, twist: Array) -> Array:
     across = np.stack((twist[..., 1], -twist[..., 0], np.zeros_like(twist[..., 2])), axis=-1)  # −ẑ × v
     rate: Array = acceleration + twist[..., 2:] * across
     return rate
+
+
+def wrap_angle(angle: ArrayLike) -> Array:
+    """Angles brought into (−π, π]. [rad]"""
+    return np.asarray(np.pi - np.mod(np.pi - np.asarray(angle), 2.0 * np.pi))
 
 
 def motion_in_body(samples: Array) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from caster_gym.analysis.frames import wrap_angle
 from caster_gym.mechanics.dynamics import forward_dynamics
 from caster_gym.mechanics.ground import tilt, wheel_loads
 from caster_gym.mechanics.motors import joint_torques
@@ -56,7 +57,7 @@ def least_load(robot: Robot) -> LeastLoad:
         int(wheel) + 1,
         float(np.hypot(ahead, left)),
         float(np.arctan2(left, ahead)),
-        float(np.remainder(angles[k] + np.pi, 2.0 * np.pi) - np.pi),
+        float(wrap_angle(angles[k])),
         bool(sense[k] < 0.0),
     )
 

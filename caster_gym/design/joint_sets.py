@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import kind_and_caster, named_joints, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
@@ -65,10 +66,10 @@ class _Need(NamedTuple):
         """Steering angle at which the driven lines pass through a point that they admit. [rad] (L5)"""
         x, y = point - self.pivot
         if self.roll and self.steer:
-            return _wrapped(np.arctan2(-y, -x) + self.lean)
+            return float(wrap_angle(np.arctan2(-y, -x) + self.lean))
         if self.steer:
-            return _wrapped(np.arctan2(y, x) + np.arccos(max(-self.trail / np.hypot(x, y), -1.0)))
-        return _wrapped(np.arctan2(y, x) + self.lean) if self.roll else 0.0
+            return float(wrap_angle(np.arctan2(y, x) + np.arccos(max(-self.trail / np.hypot(x, y), -1.0))))
+        return float(wrap_angle(np.arctan2(y, x) + self.lean)) if self.roll else 0.0
 
 
 def classify(robot: Robot, joints: str | Sequence[str]) -> JointSet:
@@ -134,7 +135,7 @@ def turned_parallel(robot: Robot, joints: str | Sequence[str], angle: float) -> 
         if need.roll and need.steer:
             raise ValueError(f"both joints of caster {i} are named, whose two lines are never parallel")
         turn = -0.5 * np.pi if need.steer else need.lean  # from the line to f
-        angles.append(_wrapped(angle + turn) if need.roll or need.steer else 0.0)  # (L5)
+        angles.append(float(wrap_angle(angle + turn)) if need.roll or need.steer else 0.0)  # (L5)
     return tuple(angles)
 
 
@@ -312,8 +313,3 @@ def _symmetries(robot: Robot) -> list[tuple[int, ...]]:
         return bool((abs(moved - distances) <= room).all() and (abs(same_links - links) <= ALIKE * links.max()).all())
 
     return [order for order in permutations(range(robot.caster_count)) if keeps(list(order))]
-
-
-def _wrapped(angle: float) -> float:
-    """The angle in (−π, π]. [rad]"""
-    return float(np.pi - (np.pi - angle) % (2.0 * np.pi))

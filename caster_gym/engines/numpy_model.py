@@ -20,7 +20,7 @@ from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
-from caster_gym.mechanics.slip import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state
 from caster_gym.robot import Robot, check_joints
 
 ROUGHEST = 1e6  # [-] between hull and obstacles: a contact sticks long before

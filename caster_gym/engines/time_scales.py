@@ -13,11 +13,7 @@ from caster_gym.arrays import Array
 from caster_gym.mechanics import stability
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.dynamics import caster_inertia, forward_dynamics, platform_inertia
-from caster_gym.mechanics.parameters import (
-    CasterParameters,
-    RobotParameters,
-    unpack_parameters,
-)
+from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, unpack_parameters
 from caster_gym.mechanics.scalars import Direction, Symmetric, each
 
 Share: TypeAlias = Callable[[Direction, CasterParameters], Symmetric]

@@ -22,7 +22,8 @@ from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import each, pairs
 from caster_gym.mechanics.separation import Obstacles
-from caster_gym.mechanics.slip import slip_step, unpack_slip_state
+from caster_gym.mechanics.slip import slip_step
+from caster_gym.mechanics.slip_state import unpack_slip_state
 from caster_gym.robot import Robot
 
 

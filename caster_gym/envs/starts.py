@@ -18,15 +18,14 @@ from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.native.layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
 from caster_gym.envs.native.reference import Courses
-from caster_gym.envs.randomness import bits, episode_seed
+from caster_gym.envs.randomness import episode_seed, uniforms
 from caster_gym.envs.tracking import Reference, start
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import unpack_parameters
-from caster_gym.mechanics.slip import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state
 from caster_gym.paths.trajectory import rounded_down
 from caster_gym.robot import Robot
 
-_SHIFT = np.uint64(11)
 _BY_ROUNDING = 1.0 + 1e-9  # of speeds and lengths that stand exactly at their limit
 
 
@@ -180,8 +179,7 @@ def _drawn_pose(engine: TaskEngine, selected: NDArray[np.int64]) -> Array:
     x, y, cos, sin = engine.look().reports[FIRST_POSE + 4 : FIRST_POSE + 8, selected]
     keys, coming = engine.episodes(selected)
     seeds = episode_seed(keys, coming - np.uint64(1))
-    drawn = bits(seeds[:, None], np.arange(1, 4, dtype=np.uint64)) >> _SHIFT
-    sides, forth, turns = (2.0 * (drawn.astype(np.float64) * 2.0**-53) - 1.0).T.copy()
+    sides, forth, turns = (2.0 * uniforms(seeds, np.arange(1, 4)) - 1.0).T.copy()
     offset, turn = engine.spread
     none = np.zeros_like(x)
     reference = Reference(x, y, cos, sin, none, none, none, none, none, none)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
 from caster_gym.identification.fit import Identification
 from caster_gym.identification.recording import KIND_UNITS
@@ -37,8 +38,9 @@ def write_identify_figure(path: Path, found: Identification) -> None:
     for row, (kind, place) in enumerate(firsts.items()):
         left, right = figure.axes[2 * row], figure.axes[2 * row + 1]
         measured = shooting.measured[..., place]
-        errors = [wrapped(path[..., place] - measured, kind) for path in (found.before, found.after)]
-        shown = np.unwrap(measured.ravel()).reshape(measured.shape) if kind in ("heading", "steering") else measured
+        errors, shown = [path[..., place] - measured for path in (found.before, found.after)], measured
+        if kind in ("heading", "steering"):
+            errors, shown = [*map(wrap_angle, errors)], np.unwrap(measured.ravel()).reshape(measured.shape)
         left.plot(time, shown.ravel(), ".", color="0.72", markersize=6.0, label="measured")
         for error, colour, label in zip(errors, (COLOURS[2], COLOURS[0]), _LABELS, strict=True):
             draw_windows(left, time, shown + error, colour, label)
@@ -65,8 +67,3 @@ def draw_windows(axis: "Axes", time: NDArray[np.floating], values: Array, colour
     apart = np.concatenate([values, np.full((len(values), 1), np.nan)], axis=1)
     times = time.reshape(values.shape)
     axis.plot(np.concatenate([times, times[:, -1:]], axis=1).ravel(), apart.ravel(), color=colour, lw=1.2, label=label)
-
-
-def wrapped(error: Array, kind: str) -> Array:
-    """Errors, of angles within ± π."""
-    return np.mod(error + np.pi, 2.0 * np.pi) - np.pi if kind in ("heading", "steering") else error

@@ -18,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 import torch
 
+from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.tensor.model import TorchModel
@@ -102,7 +103,7 @@ class Shooting:
         states = model.simulate(path[:, :-1, :width], torque, fine, FINER, checked=True)
         errors: Array = states[-1] - path[:, 1:, :width]
         angles = [2, *range(6, width)]
-        errors[..., angles] = np.mod(errors[..., angles] + np.pi, 2.0 * np.pi) - np.pi
+        errors[..., angles] = wrap_angle(errors[..., angles])
         if self._rolls:
             rolled = rolled_along(model, states, torque, fine)[-1]
             errors = np.concatenate([errors, rolled - np.diff(path[..., width:], axis=1)], axis=-1)
@@ -121,7 +122,7 @@ class Shooting:
         """Predicted minus measured (W, S, observed), angles within ± π."""
         errors = self.at_samples(path, values) - self.measured
         with np.errstate(invalid="ignore"):
-            turned = np.mod(errors + np.pi, 2.0 * np.pi) - np.pi
+            turned = wrap_angle(errors)
         return np.where(self._angle, turned, errors)
 
     def derivatives(self, path: Array, values: Array) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_betwe
 from caster_gym.mechanics.grip_or_slip import careful_step, impact, power, response
 from caster_gym.mechanics.ground import FloorUse
 from caster_gym.mechanics.integration import State, difference, pack_state, state_where, unit
+from caster_gym.mechanics.linear import rotate, scale, scale_pair
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, add, anywhere, each, maximum, minimum, total, where
 from caster_gym.mechanics.separation import TOUCH, Hull, Obstacles, contact_points, separation
@@ -85,7 +86,7 @@ def holding_force(
     heading = unit((c - s * omega * h, s + c * omega * h))
     held, normal = hold(free, state, heading, answer, hull, obstacles, first, end)
     rate = 1.0 / maximum(h, 1e-9)
-    return (held[0] * rate, held[1] * rate, held[2] * rate), normal
+    return scale(rate, held), normal
 
 
 def land(
@@ -103,7 +104,7 @@ def land(
     """State and record after the impulses on those who land."""
     bounced, hits, used = impact(state, restitution, robot, hull, obstacles, first, end, surface)
     c, s = state.heading
-    jx, jy = c * hits.wrench[0] - s * hits.wrench[1], s * hits.wrench[0] + c * hits.wrench[1]
+    jx, jy = rotate(state.heading, (hits.wrench[0], hits.wrench[1]))
     px, py = hits.point
     at = (state.position[0] + c * px - s * py, state.position[1] + s * px + c * py)
     acted = lands & (hits.normal > 0.0)
@@ -151,9 +152,8 @@ def guarded_step(
         short = (landing < 0.5) & (hit < trial) & (doubt == 0.0)  # numbers that are not finite are walked into
         walks = where(short, nothing, left) > 0.0
         lands = walks & (landing > 0.5)
-        c, s = target.heading
         share = where(walks, trial, nothing)
-        impulse = (share * (c * push[0] - s * push[1]), share * (s * push[0] + c * push[1]))
+        impulse = scale_pair(share, rotate(target.heading, (push[0], push[1])))
         touch = Touch(
             add(touch.impulse, impulse),
             touch.pressing + where(walks, pressing, nothing),

@@ -5,25 +5,27 @@ What answers to impulses is an argument `m`, the inertia M(δ) of a robot whose 
 
 from typing import Any, NamedTuple
 
-from caster_gym.mechanics.impulse import Mobility, contact_rows, impact, pushed
+from caster_gym.mechanics import contact_table as row
+from caster_gym.mechanics.contact_table import contact_of, gather
+from caster_gym.mechanics.impulse import Mobility, impact, pushed
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.linear import dot, multiply, solve
+from caster_gym.mechanics.linear import dot, multiply, shift, subtract
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
     Symmetric,
     Vector,
     absolute,
+    add,
     anywhere,
     clip,
     each,
     maximum,
-    memory,
     minimum,
     sqrt,
     where,
 )
-from caster_gym.mechanics.separation import TOUCH, Hull, Obstacles, contact_points, separation
+from caster_gym.mechanics.separation import Hull, Obstacles
 
 RESTING = 0.01  # [m/s] slower contacts do not bounce
 STILL = 1e-6  # [m/s] slower contacts do not approach
@@ -33,14 +35,7 @@ SETTLED, COARSE = 1e-9, 1e-6  # [m/s] changes at which sweeps end; the latter in
 # Share of what all contacts together can bear that a sweep corrects, and share of its last change that it repeats: the
 # first settles nearly everything, the second what settles slowly, the third what sways.
 _SHARES, _LATER, _LAST = ((1.5, 0.3), (1.5, 0.7), (0.5, 0.7)), 80, 240
-_SAME = 1e-9  # [m] contacts that are nearer are one
 _TINY, _HUGE = 1e-30, 1e30
-
-_FIELDS = 24  # of a contact: its rows, then
-_POINT, _TOUCHES, _BEFORE = 12, 14, 15  # place in B [m], 1 or 0, speed along the normal before the impulses [m/s]
-_LEAST, _MOST = 16, 17  # bounds of its normal impulse [N s]
-_ALONG, _ACROSS, _CHANGE_ALONG, _CHANGE_ACROSS = 18, 19, 20, 21  # impulses, and how the last sweep changed them [N s]
-_SCALE_ALONG, _SCALE_ACROSS = 22, 23  # bounds for the speeds [m/s] that all impulses of 1 N s give it together
 
 
 class Pressure(NamedTuple):
@@ -52,79 +47,6 @@ class Pressure(NamedTuple):
     impacts: Scalar  # 1 if any contact approached faster than RESTING, else 0
 
 
-class Contact(NamedTuple):
-    """One point where the robot may touch an obstacle: N and T, and what a unit of impulse along them changes."""
-
-    n: Vector
-    t: Vector
-    m_n: Vector
-    m_t: Vector
-
-
-def distance(one: Contact, other: Contact) -> Scalar:
-    """How far two contacts are from being the same, in place [m] and direction."""
-    far = absolute(one.n[0] - other.n[0]) + absolute(one.n[1] - other.n[1])
-    return far + absolute(one.n[2] - other.n[2]) + absolute(one.t[2] - other.t[2])
-
-
-def gather(
-    state: State, heading: Direction, m: Symmetric, hull: Hull, obstacles: Obstacles, first: Any, end: Any
-) -> tuple[Any, int]:
-    """Both contact points of each obstacle that the robot touches, in the directions of `heading`, and their number.
-
-    A row of _FIELDS entries each. Points that are there already, the second of a corner's for instance, are marked as
-    not touching, as are those of a batch where another robot touches.
-    """
-    nothing = 0.0 * state.position[0]
-    table = memory(nothing, 2 * _FIELDS * (end - first))
-    count = 0
-    c, s = heading
-    for k in range(first, end):
-        apart = separation(state.position, state.heading, hull, obstacles, k)
-        touching = apart.gap < TOUCH
-        if not anywhere(touching):
-            continue
-        normal = (c * apart.nx + s * apart.ny, c * apart.ny - s * apart.nx)
-        points = contact_points(state.position, heading, apart, hull, obstacles, k)
-        for i in range(2):
-            n, t = contact_rows(points[i], normal)
-            m_n, m_t = solve(m, n), solve(m, t)
-            at = _FIELDS * count
-            for q in range(3):
-                table[at + q], table[at + 3 + q] = n[q], t[q]
-                table[at + 6 + q], table[at + 9 + q] = m_n[q], m_t[q]
-            table[at + _POINT], table[at + _POINT + 1] = points[i]
-            table[at + _TOUCHES] = where(touching, 1.0 + nothing, nothing)
-            count += 1
-    for j in range(count):
-        for k in range(j):
-            apart_by = distance(contact_of(table, j), contact_of(table, k))
-            again = (apart_by < _SAME) & (table[_FIELDS * k + _TOUCHES] > 0.5)
-            table[_FIELDS * j + _TOUCHES] = where(again, nothing, table[_FIELDS * j + _TOUCHES])
-    for j in range(count):
-        one, at = contact_of(table, j), _FIELDS * j
-        along, across = nothing, nothing
-        for k in range(count):
-            other, there = contact_of(table, k), table[_FIELDS * k + _TOUCHES]
-            along = along + there * (absolute(dot(one.n, other.m_n)) + absolute(dot(one.n, other.m_t)))
-            across = across + there * (absolute(dot(one.t, other.m_n)) + absolute(dot(one.t, other.m_t)))
-        touches = table[at + _TOUCHES] > 0.5
-        table[at + _SCALE_ALONG] = where(touches, along, 1.0 + nothing)
-        table[at + _SCALE_ACROSS] = where(touches, across, 1.0 + nothing)
-    return table, count
-
-
-def contact_of(table: Any, j: int) -> Contact:
-    """Contact j of a table."""
-    at = _FIELDS * j
-    return Contact(
-        (table[at], table[at + 1], table[at + 2]),
-        (table[at + 3], table[at + 4], table[at + 5]),
-        (table[at + 6], table[at + 7], table[at + 8]),
-        (table[at + 9], table[at + 10], table[at + 11]),
-    )
-
-
 def settle(v: Vector, table: Any, count: int, friction: Scalar) -> Vector:
     """Twist after joint impulses at all contacts, which the table then holds.
 
@@ -134,25 +56,26 @@ def settle(v: Vector, table: Any, count: int, friction: Scalar) -> Vector:
     """
     nothing = 0.0 * v[0]
     for j in range(count):
-        for q in range(_ALONG, _CHANGE_ACROSS + 1):
-            table[_FIELDS * j + q] = nothing
+        for q in range(row.ALONG, row.CHANGE_ACROSS + 1):
+            table[row.FIELDS * j + q] = nothing
     settled = where((1.0 + nothing) + SETTLED > 1.0, SETTLED, COARSE)
     goes_on = nothing < 1.0  # a robot of a batch stops where it would stop alone
     for sweep in range(SWEEPS):
         share, momentum = _SHARES[0] if sweep < _LATER else _SHARES[1] if sweep < _LAST else _SHARES[2]
         changing, after = nothing > 1.0, v
         for j in range(count):
-            one, at = contact_of(table, j), _FIELDS * j
-            acts = goes_on & (table[at + _TOUCHES] > 0.5)
-            along, across = table[at + _ALONG], table[at + _ACROSS]
-            j_n = along + momentum * table[at + _CHANGE_ALONG] - share * dot(one.n, v) / table[at + _SCALE_ALONG]
-            j_n = clip(j_n, table[at + _LEAST], table[at + _MOST])
+            one, at = contact_of(table, j), row.FIELDS * j
+            acts = goes_on & (table[at + row.TOUCHES] > 0.5)
+            along, across = table[at + row.ALONG], table[at + row.ACROSS]
+            kept = momentum * table[at + row.CHANGE_ALONG]
+            j_n = along + kept - share * dot(one.n, v) / table[at + row.SCALE_ALONG]
+            j_n = clip(j_n, table[at + row.LEAST], table[at + row.MOST])
             limit = friction * j_n
-            j_t = across + momentum * table[at + _CHANGE_ACROSS] - share * dot(one.t, v) / table[at + _SCALE_ACROSS]
-            j_t = clip(j_t, -limit, limit)
+            kept = momentum * table[at + row.CHANGE_ACROSS]
+            j_t = clip(across + kept - share * dot(one.t, v) / table[at + row.SCALE_ACROSS], -limit, limit)
             d_n, d_t = where(acts, j_n - along, nothing), where(acts, j_t - across, nothing)
-            table[at + _ALONG], table[at + _CHANGE_ALONG] = along + d_n, d_n
-            table[at + _ACROSS], table[at + _CHANGE_ACROSS] = across + d_t, d_t
+            table[at + row.ALONG], table[at + row.CHANGE_ALONG] = along + d_n, d_n
+            table[at + row.ACROSS], table[at + row.CHANGE_ACROSS] = across + d_t, d_t
             after = pushed(after, d_n, one.m_n, d_t, one.m_t)
             change = maximum(absolute(d_n) * dot(one.n, one.m_n), absolute(d_t) * dot(one.t, one.m_t))
             changing = changing | (change > settled)
@@ -168,7 +91,7 @@ def sum_of(table: Any, count: int, nothing: Scalar) -> tuple[Vector, Scalar]:
     x, y, z, normal = nothing, nothing, nothing, nothing
     for j in range(count):
         one = contact_of(table, j)
-        along, across = table[_FIELDS * j + _ALONG], table[_FIELDS * j + _ACROSS]
+        along, across = table[row.FIELDS * j + row.ALONG], table[row.FIELDS * j + row.ACROSS]
         x, y, z = pushed((x, y, z), along, one.n, across, one.t)
         normal = normal + along
     return (x, y, z), normal
@@ -187,7 +110,7 @@ def strike_alone(v: Vector, table: Any, count: int, restitution: Scalar, obstacl
     nothing = 0.0 * v[0]
     after, wrench, normal = v, (nothing, nothing, nothing), nothing
     for j in range(count):
-        one, before = contact_of(table, j), table[_FIELDS * j + _BEFORE]
+        one, before = contact_of(table, j), table[row.FIELDS * j + row.BEFORE]
         w = Mobility(dot(one.n, one.m_n), dot(one.n, one.m_t), dot(one.t, one.m_t))
         j_n, j_t = impact(before, dot(one.t, v), w, restitution, obstacles.friction, obstacles.law)
         acts = before < -STILL
@@ -196,7 +119,7 @@ def strike_alone(v: Vector, table: Any, count: int, restitution: Scalar, obstacl
         normal = where(acts, j_n, normal)
     approaches = nothing > 1.0
     for j in range(count):
-        touches = table[_FIELDS * j + _TOUCHES] > 0.5
+        touches = table[row.FIELDS * j + row.TOUCHES] > 0.5
         approaches = approaches | (touches & (dot(contact_of(table, j).n, after) < -STILL))
     return Blow(after, wrench, normal), approaches
 
@@ -213,16 +136,16 @@ def strike_together(v: Vector, m: Symmetric, table: Any, count: int, restitution
     reached, extra, more = v, wrench, nothing
     for stage in range(3):
         for j in range(count):
-            at = _FIELDS * j
-            pressed = share * table[at + _LEAST] if stage == 2 else table[at + _ALONG]
-            table[at + _LEAST] = nothing if stage == 0 else pressed
-            table[at + _MOST] = _HUGE + nothing if stage == 0 else pressed
+            at = row.FIELDS * j
+            pressed = share * table[at + row.LEAST] if stage == 2 else table[at + row.ALONG]
+            table[at + row.LEAST] = nothing if stage == 0 else pressed
+            table[at + row.MOST] = _HUGE + nothing if stage == 0 else pressed
         reached = settle(compressed, table, count, friction)
         push, along = sum_of(table, count, nothing)
         gained = nothing
         for j in range(count):
             n = contact_of(table, j).n
-            gained = gained + 0.5 * (dot(n, compressed) + dot(n, reached)) * table[_FIELDS * j + _ALONG]
+            gained = gained + 0.5 * (dot(n, compressed) + dot(n, reached)) * table[row.FIELDS * j + row.ALONG]
         if stage == 0:
             lost = maximum(0.5 * (dot(v, multiply(m, v)) - dot(reached, multiply(m, reached))), nothing)
             work = clip(-gained, nothing, lost)
@@ -232,15 +155,11 @@ def strike_together(v: Vector, m: Symmetric, table: Any, count: int, restitution
         else:
             share = where(gained > 0.0, restitution * sqrt(work / maximum(gained, _TINY)), restitution)
             extra, more = push, along
-    step = (reached[0] - compressed[0], reached[1] - compressed[1], reached[2] - compressed[2])
+    step = subtract(reached, compressed)
     half, square = dot(step, multiply(m, compressed)), dot(step, multiply(m, step))
     room = half + sqrt(half * half + 2.0 * lost * square)
     kept = minimum(2.0 * lost / maximum(room, _TINY), 1.0)  # (O9): as much of the step as the energy allows
-    return Blow(
-        (compressed[0] + kept * step[0], compressed[1] + kept * step[1], compressed[2] + kept * step[2]),
-        (wrench[0] + kept * extra[0], wrench[1] + kept * extra[1], wrench[2] + kept * extra[2]),
-        normal + kept * more,
-    )
+    return Blow(shift(kept, compressed, step), shift(kept, wrench, extra), normal + kept * more)
 
 
 def press(
@@ -258,10 +177,10 @@ def press(
     for turn in range(ROUNDS):
         active, fastest = nothing, nothing
         for j in range(count):
-            at = _FIELDS * j
-            table[at + _BEFORE] = where(table[at + _TOUCHES] > 0.5, dot(contact_of(table, j).n, v), nothing)
-            active = active + where(table[at + _BEFORE] < -STILL, 1.0 + nothing, nothing)
-            fastest = minimum(table[at + _BEFORE], fastest)
+            at = row.FIELDS * j
+            table[at + row.BEFORE] = where(table[at + row.TOUCHES] > 0.5, dot(contact_of(table, j).n, v), nothing)
+            active = active + where(table[at + row.BEFORE] < -STILL, 1.0 + nothing, nothing)
+            fastest = minimum(table[at + row.BEFORE], fastest)
         acts = active > 0.5
         bounce = where(fastest < -RESTING, restitution + nothing, nothing) if turn < ROUNDS - 1 else nothing
         if not anywhere(acts):
@@ -277,17 +196,17 @@ def press(
             )
         at_x, at_y, weights = nothing, nothing, nothing
         for j in range(count):
-            at = _FIELDS * j
-            weight = where(table[at + _BEFORE] < -RESTING, where(jointly, _TINY + table[at + _ALONG], 1.0), nothing)
-            at_x, at_y = at_x + weight * table[at + _POINT], at_y + weight * table[at + _POINT + 1]
+            at = row.FIELDS * j
+            strength = where(jointly, _TINY + table[at + row.ALONG], 1.0)
+            weight = where(table[at + row.BEFORE] < -RESTING, strength, nothing)
+            at_x, at_y = at_x + weight * table[at + row.POINT], at_y + weight * table[at + row.POINT + 1]
             weights = weights + weight
         strikes = weights > 0.0
         total = where(strikes, weights, 1.0 + nothing)
         point = (where(strikes, at_x / total, point[0]), where(strikes, at_y / total, point[1]))
         struck = where(strikes, 1.0 + nothing, struck)
         v = each(where, (acts,), blow.after, v)
-        push = each(where, (acts,), blow.wrench, (nothing, nothing, nothing))
-        wrench = (wrench[0] + push[0], wrench[1] + push[1], wrench[2] + push[2])
+        wrench = add(wrench, each(where, (acts,), blow.wrench, (nothing, nothing, nothing)))
         normal = normal + where(acts, blow.normal, nothing)
     return v, Pressure(wrench, normal, point, struck)
 
@@ -311,7 +230,7 @@ def hold(
     table, count = gather(state, heading, m, hull, obstacles, first, end)
     for j in range(count):
         lasts = dot(contact_of(table, j).n, state.twist) > -RESTING
-        table[_FIELDS * j + _TOUCHES] = where(lasts, table[_FIELDS * j + _TOUCHES], nothing)
-        table[_FIELDS * j + _LEAST], table[_FIELDS * j + _MOST] = nothing, _HUGE + nothing
+        table[row.FIELDS * j + row.TOUCHES] = where(lasts, table[row.FIELDS * j + row.TOUCHES], nothing)
+        table[row.FIELDS * j + row.LEAST], table[row.FIELDS * j + row.MOST] = nothing, _HUGE + nothing
     settle(v, table, count, obstacles.friction)
     return sum_of(table, count, nothing)

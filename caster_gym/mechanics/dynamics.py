@@ -8,7 +8,7 @@ the components of v in B. Along and across mean along f and f⊥.
 from typing import NamedTuple
 
 from caster_gym.mechanics.caster import pivot_velocity, rates
-from caster_gym.mechanics.linear import dot, multiply, solve
+from caster_gym.mechanics.linear import dot, multiply, rotate, solve, subtract
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Symmetric, Vector, add, each, sqrt, total
 
@@ -105,8 +105,7 @@ def at_pivot(theta: Scalar, eta: Scalar, caster: CasterParameters) -> tuple[Scal
 
 def at_platform(along: Scalar, across: Scalar, turn: Scalar, f: Direction, caster: CasterParameters) -> Vector:
     """Generalised force at C of a force at one caster's pivot and a moment at ω."""
-    c, s = f
-    x, y = c * along - s * across, s * along + c * across
+    x, y = rotate(f, (along, across))
     return x, y, caster.x * y - caster.y * x + turn
 
 
@@ -183,8 +182,7 @@ def forward_dynamics(
     """Twist rate under joint torques (rolling, steering) per caster and an external wrench at C. (D5)"""
     push = total(each(caster_force, (v, robot.platform.coulomb_speed), directions, robot.casters, torques))
     h = platform_bias(v, robot.platform)
-    force = (push[0] + wrench[0] - h[0], push[1] + wrench[1] - h[1], push[2] + wrench[2] - h[2])
-    return solve(inertia(directions, robot), force)
+    return solve(inertia(directions, robot), subtract(add(push, wrench), h))
 
 
 def inverse_dynamics(v: Vector, directions: tuple[Direction, ...], v_rate: Vector, robot: RobotParameters) -> Vector:

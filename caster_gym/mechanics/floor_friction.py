@@ -11,7 +11,7 @@ Newton's method is needed for those three alone, in a fixed number of rounds wit
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.linear import dot, factors, multiply, substitute
+from caster_gym.mechanics.linear import dot, factors, multiply, scale, scale_pair, shift, substitute, subtract
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
@@ -112,8 +112,8 @@ def floor_stiffness(footing: Footing, wheel: Grip) -> Symmetric:
     """How the floor holds the platform by one wheel. [kg, kg m, kg m²]"""
     a, b = footing.rows
     xx, xy, yy = wheel.stiffness
-    p = (xx * a[0] + xy * b[0], xx * a[1] + xy * b[1], xx * a[2] + xy * b[2])
-    q = (xy * a[0] + yy * b[0], xy * a[1] + yy * b[1], xy * a[2] + yy * b[2])
+    p = shift(xy, scale(xx, a), b)
+    q = shift(yy, scale(xy, a), b)
     return (
         a[0] * p[0] + b[0] * q[0],
         a[0] * p[1] + b[0] * q[1],
@@ -145,7 +145,7 @@ def newton_round(
     pushed = add(force, total(each(floor_wrench, (), footings, grips)))
     held = add(inertia, total(each(floor_stiffness, (), footings, grips)))
     taken = multiply(inertia, change)
-    left = (pushed[0] - taken[0], pushed[1] - taken[1], pushed[2] - taken[2])
+    left = subtract(pushed, taken)
     step = substitute(factors(held), left)
     return add(change, step), each(slide_of, (), grips)
 
@@ -168,7 +168,7 @@ def work_parts(wheel: Grip, before: Direction, answer: Direction) -> tuple[Scala
 
 def lessened(share: Scalar, wheel: Grip) -> Grip:
     """A wheel with a share of its impulse."""
-    return Grip((share * wheel.impulse[0], share * wheel.impulse[1]), wheel.slide, wheel.stiffness)
+    return Grip(scale_pair(share, wheel.impulse), wheel.slide, wheel.stiffness)
 
 
 def cut_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...]) -> tuple[Vector, tuple[Grip, ...]]:
@@ -195,5 +195,5 @@ def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...])
     gained, resisted = total(each(work_parts, (), grips, before, each(floor_answer, (by_floor,), footings, grips)))
     nothing = 0.0 * resisted
     share = clip(-gained / maximum(resisted, TINY + nothing), nothing, 1.0 + nothing)  # (S14)
-    step = (share * by_floor[0], share * by_floor[1], share * by_floor[2])
+    step = scale(share, by_floor)
     return add(alone, step), each(lessened, (share,), grips)

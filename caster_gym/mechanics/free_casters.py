@@ -14,25 +14,11 @@ three rows for the platform. Once the casters are eliminated, one by one, what i
 from typing import NamedTuple
 
 from caster_gym.mechanics.caster import pivot_velocity
-from caster_gym.mechanics.caster_masses import (
-    Slopes,
-    first_moments,
-    friction_slopes,
-    held_inertia,
-    without_friction,
-)
+from caster_gym.mechanics.caster_masses import Slopes, first_moments, friction_slopes, held_inertia, without_friction
 from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
-from caster_gym.mechanics.linear import dot, solve
+from caster_gym.mechanics.linear import dot, solve, subtract
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
-from caster_gym.mechanics.scalars import (
-    Direction,
-    Scalar,
-    Symmetric,
-    Vector,
-    add,
-    each,
-    total,
-)
+from caster_gym.mechanics.scalars import Direction, Scalar, Symmetric, Vector, add, each, total
 
 Pair = tuple[Scalar, Scalar]
 
@@ -160,7 +146,7 @@ def balance(given: Forces, taken: Forces) -> Forces:
     return Forces(
         given.at_eta - taken.at_eta,
         given.at_theta - taken.at_theta,
-        (p[0] - q[0], p[1] - q[1], p[2] - q[2]),
+        subtract(p, q),
     )
 
 
@@ -284,7 +270,7 @@ def slip_dynamics(
     felt = total(each(felt_force, (), edges, forces))
     h = platform_bias(v, robot.platform)
     whole = add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges)))
-    v_rate = solve(whole, (felt[0] + wrench[0] - h[0], felt[1] + wrench[1] - h[1], felt[2] + wrench[2] - h[2]))
+    v_rate = solve(whole, subtract(add(felt, wrench), h))
     still = each(no_rates, (), rates)
     return v_rate, each(follow, (v_rate,), each(free_response, (1.0,), still, owns, forces), edges)
 

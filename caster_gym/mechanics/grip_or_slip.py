@@ -12,12 +12,14 @@ from caster_gym.mechanics.floor import Surface
 from caster_gym.mechanics.free_casters import Pair
 from caster_gym.mechanics.ground import FloorUse, floor_use, impact_traction, lifts
 from caster_gym.mechanics.integration import State, rk4_step
+from caster_gym.mechanics.linear import shift, subtract
 from caster_gym.mechanics.motors import joint_power
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, apart, each, either, greatest, total
 from caster_gym.mechanics.separation import Hull, Obstacles
-from caster_gym.mechanics.slip import Footfall, slip_step, with_velocities
+from caster_gym.mechanics.slip import Footfall, slip_step
 from caster_gym.mechanics.slip_impact import answered_impact, held_answer, impact_footing
+from caster_gym.mechanics.slip_state import with_velocities
 
 IMPACT_ROUNDS = 6  # in which impulses of the obstacles and of the floor agree to some thousandths
 
@@ -100,9 +102,8 @@ def rolling_response(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[Vector, Symmetric]:
     """To first order in h."""
-    v = state.twist
-    a = forward_dynamics(v, state.directions, torques, wrench, robot)
-    return (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]), inertia(state.directions, robot)
+    rate = forward_dynamics(state.twist, state.directions, torques, wrench, robot)
+    return shift(h, state.twist, rate), inertia(state.directions, robot)
 
 
 def slipping_response(
@@ -160,9 +161,8 @@ def rolling_impact(
     state: State, restitution: Scalar, robot: RobotParameters, hull: Hull, obstacles: Obstacles, first: Any, end: Any
 ) -> tuple[State, Pressure, Scalar]:
     """The wheels keep rolling, whatever the floor must hold."""
-    v = state.twist
     after, hits = press(state, inertia(state.directions, robot), restitution, hull, obstacles, first, end)
-    used = impact_traction((after[0] - v[0], after[1] - v[1], after[2] - v[2]), state.directions, robot)
+    used = impact_traction(subtract(after, state.twist), state.directions, robot)
     return with_velocities(state, after, state.rates, state.tilt), hits, used
 
 
@@ -186,6 +186,6 @@ def slipping_impact(
         start, answer, slides = held_answer(change, slides, floor, v)
         before = with_velocities(state, start, state.rates, state.tilt)
         after, hits = press(before, answer, restitution, hull, obstacles, first, end)
-        change = (after[0] - v[0], after[1] - v[1], after[2] - v[2])
+        change = subtract(after, v)
     ended, used = answered_impact(hits.wrench, change, slides, floor, state, robot)
     return ended, hits, used

@@ -128,7 +128,7 @@ def tilt(
     """Moment, as height times force along x and y of B, by which a moving robot presses on its rear wheels. [N m]"""
     casters = total(each(caster_tilt, (v, v_rate), directions, robot.casters))
     platform = platform_tilt(v, v_rate, wrench, robot.platform)
-    return platform[0] + casters[0], platform[1] + casters[1]
+    return add(platform, casters)
 
 
 def load_matrix(f: Direction, caster: CasterParameters, carries: Scalar) -> Symmetric:

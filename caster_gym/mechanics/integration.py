@@ -1,9 +1,11 @@
 """State and time step. Directions are unit vectors: (c, s)' = rate · (−s, c), so nothing wraps; no angle is needed."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.dynamics import forward_dynamics
+from caster_gym.mechanics.linear import rotate, shift, shift_pair
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, flatten, pairs, where
 
@@ -66,7 +68,7 @@ def derivative(
     c, s = state.heading
     vx, vy, omega = state.twist
     return State(
-        (c * vx - s * vy, s * vx + c * vy),
+        rotate(state.heading, (vx, vy)),
         (-s * omega, c * omega),
         forward_dynamics(state.twist, state.directions, torques, wrench, robot),
         each(steering_turn, (state.twist,), state.directions, robot.casters),
@@ -75,19 +77,13 @@ def derivative(
     )
 
 
-def advance_pair(h: Scalar, a: Direction, rate: Direction) -> Direction:
-    """a + h · rate."""
-    return a[0] + h * rate[0], a[1] + h * rate[1]
-
-
 def advance(state: State, h: Scalar, rate: State) -> State:
     """state + h · rate."""
-    v, a = state.twist, rate.twist
     return State(
-        advance_pair(h, state.position, rate.position),
-        advance_pair(h, state.heading, rate.heading),
-        (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]),
-        each(advance_pair, (h,), state.directions, rate.directions),
+        shift_pair(h, state.position, rate.position),
+        shift_pair(h, state.heading, rate.heading),
+        shift(h, state.twist, rate.twist),
+        each(shift_pair, (h,), state.directions, rate.directions),
         state.rates,
         state.tilt,
     )
@@ -100,13 +96,23 @@ def unit(f: Direction) -> Direction:
     return c * scale, s * scale
 
 
+def runge_kutta(
+    rate: Callable[..., Any], move: Callable[..., Any], start: Any, h: Scalar, given: tuple[Any, ...]
+) -> Any:
+    """Where a motion from `start` is after h seconds, by the classical Runge–Kutta method.
+
+    rate(state, *given): its derivative. move(state, h, rate): state + h · rate.
+    """
+    k1 = rate(start, *given)
+    k2 = rate(move(start, 0.5 * h, k1), *given)
+    k3 = rate(move(start, 0.5 * h, k2), *given)
+    k4 = rate(move(start, h, k3), *given)
+    return move(move(move(move(start, h / 6.0, k1), h / 3.0, k2), h / 3.0, k3), h / 6.0, k4)
+
+
 def rk4_step(
     state: State, torques: tuple[tuple[Scalar, Scalar], ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> State:
-    """One step of the classical Runge–Kutta method under constant torques and wrench. Step h in s."""
-    k1 = derivative(state, torques, wrench, robot)
-    k2 = derivative(advance(state, 0.5 * h, k1), torques, wrench, robot)
-    k3 = derivative(advance(state, 0.5 * h, k2), torques, wrench, robot)
-    k4 = derivative(advance(state, h, k3), torques, wrench, robot)
-    end = advance(advance(advance(advance(state, h / 6.0, k1), h / 3.0, k2), h / 3.0, k3), h / 6.0, k4)
+    """One step under constant torques and wrench. Step h in s."""
+    end = runge_kutta(derivative, advance, state, h, (torques, wrench, robot))
     return State(end.position, unit(end.heading), end.twist, each(unit, (), end.directions), end.rates, end.tilt)

@@ -1,6 +1,6 @@
 """Vectors of three scalars and symmetric 3×3 matrices (xx, xy, xz, yy, yz, zz), for three degrees of freedom."""
 
-from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, clip, maximum, sqrt, where
+from caster_gym.mechanics.scalars import Direction, Scalar, Symmetric, Vector, clip, maximum, sqrt, where
 
 NEWTON_STEPS = 5  # from 2 to a root in [√3, 2] of a cubic whose slope there is at least 6: below rounding
 
@@ -8,6 +8,36 @@ NEWTON_STEPS = 5  # from 2 to a root in [√3, 2] of a cubic whose slope there i
 def dot(a: Vector, b: Vector) -> Scalar:
     """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scale(h: Scalar, a: Vector) -> Vector:
+    """h a."""
+    return h * a[0], h * a[1], h * a[2]
+
+
+def shift(h: Scalar, a: Vector, b: Vector) -> Vector:
+    """a + h b."""
+    return a[0] + h * b[0], a[1] + h * b[1], a[2] + h * b[2]
+
+
+def scale_pair(h: Scalar, a: Direction) -> Direction:
+    """h a, of two numbers."""
+    return h * a[0], h * a[1]
+
+
+def shift_pair(h: Scalar, a: Direction, b: Direction) -> Direction:
+    """a + h b, of two numbers."""
+    return a[0] + h * b[0], a[1] + h * b[1]
+
+
+def rotate(f: Direction, a: Direction) -> Direction:
+    """A vector of the plane turned by the angle of a unit vector: from components along f and f⊥ to those beside f."""
+    return f[0] * a[0] - f[1] * a[1], f[1] * a[0] + f[0] * a[1]
 
 
 def solve(m: Symmetric, b: Vector) -> Vector:

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from caster_gym.mechanics.contact import Touch, guarded_step
-from caster_gym.mechanics.free_casters import Pair, slip_velocity
+from caster_gym.mechanics.free_casters import Pair
 from caster_gym.mechanics.grip_or_slip import all_joint_rates, noted_step
 from caster_gym.mechanics.ground import FloorUse
 from caster_gym.mechanics.integration import State
@@ -11,6 +11,7 @@ from caster_gym.mechanics.motors import joint_torques, motor_speeds, motor_torqu
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Vector, each, sqrt, total
 from caster_gym.mechanics.separation import Hull, Obstacles
+from caster_gym.mechanics.slip_state import slips_of
 
 
 class Drive(NamedTuple):
@@ -71,7 +72,7 @@ def slip_speed(u: Pair) -> Scalar:
 
 def slip_speeds(state: State, robot: RobotParameters) -> tuple[Scalar, ...]:
     """How fast each wheel that may slip does. [m/s]"""
-    return each(slip_speed, (), each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters))
+    return each(slip_speed, (), slips_of(state, robot))
 
 
 def guarded_driven_step(

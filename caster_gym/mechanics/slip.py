@@ -6,7 +6,6 @@ so that wheels that are held stay at rest at the floor, and slip starts, ends an
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.caster_masses import friction_slopes, implicit_shares
 from caster_gym.mechanics.dynamics import platform_bias, platform_inertia
 from caster_gym.mechanics.floor_friction import (
@@ -44,6 +43,7 @@ from caster_gym.mechanics.free_casters import (
 )
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.linear import rotate, scale, scale_pair, shift, subtract
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import (
     Direction,
@@ -54,12 +54,12 @@ from caster_gym.mechanics.scalars import (
     clip,
     each,
     maximum,
-    pairs,
     sqrt,
     total,
     where,
 )
 from caster_gym.mechanics.slip_energy import explained_share
+from caster_gym.mechanics.slip_state import moved, slips_of, with_velocities
 from caster_gym.mechanics.slip_tilt import tilt_after
 
 Pair = tuple[Scalar, Scalar]
@@ -85,45 +85,6 @@ class Stage(NamedTuple):
     owns: tuple[OwnInertia, ...]
     edges: tuple[Border, ...]
     free: tuple[Pair, ...]  # [rad/s] rates at the end while the platform moves on and the floor lets go
-
-
-def unpack_slip_state(flat: tuple[Scalar, ...]) -> State:
-    """Inverse of `pack_state` for wheels that may slip."""
-    half = (len(flat) + 5) // 2
-    return State(
-        (flat[0], flat[1]),
-        (flat[2], flat[3]),
-        (flat[4], flat[5], flat[6]),
-        pairs(flat[7:half]),
-        pairs(flat[half:-2]),
-        (flat[-2], flat[-1]),
-    )
-
-
-def rolling_state(state: State, robot: RobotParameters) -> State:
-    """A state without rates as one of wheels that do not slip yet, with loads as at rest."""
-    nothing = 0.0 * state.twist[0]
-    rates = each(rolling_rates, (state.twist,), state.directions, robot.casters)
-    return State(state.position, state.heading, state.twist, state.directions, rates, (nothing, nothing))
-
-
-def rolling_rates(v: Vector, f: Direction, caster: CasterParameters) -> Pair:
-    """Yaw over ground and roll of a caster that rolls without slip. [rad/s]"""
-    eta, theta, _ = rates(v, f, caster)
-    return eta, theta
-
-
-def turned(f: Direction, angle: Scalar) -> Direction:
-    """A direction turned by an angle, of second order in it, and no longer or shorter than it was."""
-    t = 0.5 * angle
-    scale = 1.0 / (1.0 + t * t)
-    c, s = (1.0 - t * t) * scale, 2.0 * t * scale  # (S9)
-    return c * f[0] - s * f[1], s * f[0] + c * f[1]
-
-
-def steered(h: Scalar, omega: Scalar, f: Direction, rates: Pair) -> Direction:
-    """Rolling direction in B after h seconds."""
-    return turned(f, h * (rates[0] - omega))
 
 
 def lasting_slide(before: Pair, halfway: Pair, free: Pair) -> Pair:
@@ -185,11 +146,7 @@ def stage(
     return Stage(
         time,
         add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges))),
-        (
-            known[0] + time * (felt[0] + wrench[0] - h[0]),
-            known[1] + time * (felt[1] + wrench[1] - h[1]),
-            known[2] + time * (felt[2] + wrench[2] - h[2]),
-        ),
+        shift(time, known, subtract(add(felt, wrench), h)),
         footings,
         owns,
         edges,
@@ -202,15 +159,10 @@ def impulse_of(wheel: Grip) -> Pair:
     return wheel.impulse
 
 
-def pushed(free: Pair, answer: Pair) -> Pair:
-    """Rates with the answer to an impulse."""
-    return free[0] + answer[0], free[1] + answer[1]
-
-
 def rates_after(change: Vector, grips: tuple[Grip, ...], part: Stage, robot: RobotParameters) -> tuple[Pair, ...]:
     """Rates of all casters at the end of a stage that changes the twist."""
     answers = each(push_back, (), each(impulse_of, (), grips), part.owns, robot.casters)
-    return each(follow, (change,), each(pushed, (), part.free, answers), part.edges)
+    return each(follow, (change,), each(add, (), part.free, answers), part.edges)
 
 
 def lasting_load(before: Scalar, load: Scalar) -> Scalar:
@@ -229,11 +181,6 @@ def slower(before: Limit, after: Limit, slide: Scalar) -> Scalar:
     return slide * before.most * after.inverse
 
 
-def in_body(f: Direction, impulse: Pair) -> Pair:
-    """A vector along f and f⊥, along x and y of B."""
-    return impulse[0] * f[0] - impulse[1] * f[1], impulse[0] * f[1] + impulse[1] * f[0]
-
-
 def lag(was: Pair, shall_be: Pair, caster: CasterParameters) -> Vector:
     """Wrench at C of the difference of two impulses at a pivot."""
     x, y = was[0] - shall_be[0], was[1] - shall_be[1]
@@ -242,29 +189,15 @@ def lag(was: Pair, shall_be: Pair, caster: CasterParameters) -> Vector:
 
 def turning_lag(
     grips: tuple[Grip, ...],
-    scale: Scalar,
+    times: Scalar,
     middle: tuple[Direction, ...],
     ahead: tuple[Direction, ...],
     robot: RobotParameters,
 ) -> Vector:
     """What the floor's impulses along the directions of a step's middle have more than along those of its end. (S9)"""
     impulses = each(impulse_of, (), grips)
-    was, shall_be = each(in_body, (), middle, impulses), each(in_body, (), ahead, impulses)
-    x, y, z = total(each(lag, (), was, shall_be, robot.casters))
-    return scale * x, scale * y, scale * z
-
-
-def moved(h: Scalar, state: State, along: State) -> State:
-    """The state h seconds on with the velocities of another; its own velocities as they are."""
-    (c, s), (vx, vy, omega) = along.heading, along.twist
-    position = state.position[0] + h * (c * vx - s * vy), state.position[1] + h * (s * vx + c * vy)
-    directions = each(steered, (h, omega), state.directions, along.rates)
-    return State(position, turned(state.heading, h * omega), state.twist, directions, state.rates, state.tilt)
-
-
-def with_velocities(state: State, twist: Vector, rates: tuple[Pair, ...], tilt: Pair) -> State:
-    """The state with other velocities."""
-    return State(state.position, state.heading, twist, state.directions, rates, tilt)
+    was, shall_be = each(rotate, (), middle, impulses), each(rotate, (), ahead, impulses)
+    return scale(times, total(each(lag, (), was, shall_be, robot.casters)))
 
 
 def within(wheel: Grip, limit: Limit) -> Grip:
@@ -273,21 +206,6 @@ def within(wheel: Grip, limit: Limit) -> Grip:
     one = 1.0 + 0.0 * p
     share = 1.0 / maximum(one, 2.0 * sqrt(p * p + q * q) * limit.inverse)
     return lessened(share, wheel)
-
-
-def slowed(share: Scalar, v: Vector, before: Vector) -> Vector:
-    """Change of a twist to a share of what it is."""
-    return share * v[0] - before[0], share * v[1] - before[1], share * v[2] - before[2]
-
-
-def slowed_rates(share: Scalar, rates: Pair) -> Pair:
-    """A share of a caster's rates."""
-    return share * rates[0], share * rates[1]
-
-
-def mean_force(rate: Scalar, wheel: Grip) -> Pair:
-    """Force of the floor on a wheel along f and f⊥. [N]"""
-    return rate * wheel.impulse[0], rate * wheel.impulse[1]
 
 
 def slip_step(
@@ -305,7 +223,7 @@ def slip_step(
     part = stage(half, state, state, there.directions, nothing, torques, wrench, robot)
     first_loads = wheel_loads(state.directions, state.tilt, robot)
     limits = each(limit_of, (half,), frictions, first_loads)
-    slips = each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters)
+    slips = slips_of(state, robot)
     slides = each(sliding, (), slips, limits)
     change = nothing
     problem = part.inertia, part.force, part.footings, limits
@@ -328,17 +246,16 @@ def slip_step(
     against = each(lasting_slide, (), slips, halfway, each(free_of, (), part.footings))
     footings = each(opposing, (), part.footings, against)
     slides = each(slower, (), before, limits, slides)
-    change = (2.0 * change[0], 2.0 * change[1], 2.0 * change[2])
     problem = part.inertia, part.force, footings, limits
-    change, slides = newton_round(change, 0.5, problem, slides)
+    change, slides = newton_round(scale(2.0, change), 0.5, problem, slides)
     change, slides = newton_round(change, 0.0, problem, slides)
     change, grips = final_impulses(change, problem, slides)
     rates = rates_after(change, grips, part, robot)
     share = explained_share(h, state, change, rates, end.directions, torques, wrench, robot)
-    change, rates = slowed(share, add(state.twist, change), state.twist), each(slowed_rates, (share,), rates)
+    change, rates = subtract(scale(share, add(state.twist, change)), state.twist), each(scale_pair, (share,), rates)
     tilted = tilt_after(change, rates, state, middle, h, wrench, robot)
     end = with_velocities(end, add(state.twist, change), rates, tilted)
-    slips = each(slip_velocity, (end.twist,), end.directions, end.rates, robot.casters)
+    slips = slips_of(end, robot)
     answer = add(part.inertia, total(each(floor_stiffness, (), footings, grips)))
-    forces, uses = each(mean_force, (1.0 / maximum(h, NO_TIME),), grips), each(used_share, (), grips, limits)
-    return end, Footfall(slips, forces, loads, uses, answer)
+    forces = each(scale_pair, (1.0 / maximum(h, NO_TIME),), each(impulse_of, (), grips))
+    return end, Footfall(slips, forces, loads, each(used_share, (), grips, limits), answer)

@@ -32,14 +32,14 @@ from caster_gym.mechanics.free_casters import (
     follow,
     own_inertia,
     push_back,
-    slip_velocity,
 )
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.linear import solve
+from caster_gym.mechanics.linear import scale, shift, solve
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, add, clip, each, greatest, sqrt, total
-from caster_gym.mechanics.slip import footing, impulse_of, pushed, with_velocities
+from caster_gym.mechanics.slip import footing, impulse_of
+from caster_gym.mechanics.slip_state import slips_of, with_velocities
 
 
 class ImpactFooting(NamedTuple):
@@ -88,7 +88,7 @@ def at_rest_impulse(foot: Footing, wheel: Grip) -> Vector:
     a, b = foot.rows
     xx, xy, yy = wheel.stiffness
     p, q = -xx * foot.free[0] - xy * foot.free[1], -xy * foot.free[0] - yy * foot.free[1]
-    return a[0] * p + b[0] * q, a[1] * p + b[1] * q, a[2] * p + b[2] * q
+    return shift(q, scale(p, a), b)
 
 
 def held_answer(
@@ -112,11 +112,6 @@ def answered_impact(
     """State after an impulse of obstacles at C, and the greatest share of the floor's friction that a wheel used."""
     change, grips = final_impulses(change, (floor.inertia, wrench, floor.footings, floor.limits), slides)
     answers = each(push_back, (), each(impulse_of, (), grips), floor.owns, robot.casters)
-    rates = each(follow, (change,), each(pushed, (), state.rates, answers), floor.edges)
+    rates = each(follow, (change,), each(add, (), state.rates, answers), floor.edges)
     uses = each(used_share, (), grips, floor.limits)
     return with_velocities(state, add(state.twist, change), rates, state.tilt), greatest(uses)
-
-
-def slips_of(state: State, robot: RobotParameters) -> tuple[Pair, ...]:
-    """Velocities of all wheels over the floor along f and f⊥. [m/s]"""
-    return each(slip_velocity, (state.twist,), state.directions, state.rates, robot.casters)

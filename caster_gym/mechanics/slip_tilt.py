@@ -5,9 +5,9 @@ from caster_gym.mechanics.floor_friction import NO_TIME
 from caster_gym.mechanics.free_casters import Pair, pivot_rows
 from caster_gym.mechanics.ground import platform_tilt
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.linear import dot
+from caster_gym.mechanics.linear import dot, scale
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
-from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, maximum, total
+from caster_gym.mechanics.scalars import Direction, Scalar, Vector, add, each, maximum, total
 
 
 def caster_motion(rate: Scalar, before: Pair, after: Pair, now: Pair) -> tuple[Pair, Pair]:
@@ -43,8 +43,8 @@ def tilt_after(
 ) -> Pair:
     """`ground.tilt` of a robot whose twist and rates change by so much over some seconds. [N m]"""
     rate = 1.0 / maximum(time, NO_TIME)
-    v_rate = (rate * change[0], rate * change[1], rate * change[2])
+    v_rate = scale(rate, change)
     motions = each(caster_motion, (rate,), start.rates, rates, middle.rates)
     casters = total(each(free_tilt, (middle.twist, v_rate), middle.directions, motions, robot.casters))
     platform = platform_tilt(middle.twist, v_rate, wrench, robot.platform)
-    return platform[0] + casters[0], platform[1] + casters[1]
+    return add(platform, casters)

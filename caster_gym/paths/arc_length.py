@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from caster_gym.arrays import Array, Plane
-from caster_gym.paths.trajectory import Trajectory, rounded_down
+from caster_gym.paths.trajectory import Trajectory, rounded_down, unit
 
 Values = TypeVar("Values", Array, Plane)
 
@@ -78,8 +78,8 @@ def line_along(trajectory: Trajectory, spacing: float, free_heading: bool) -> Li
         raise NoLineError(f"it is {length:.4g} m long, over {_LONGEST} rows of {spacing:g} m; its unit must be metres")
     _refuse_sharp_turns(nodes, count)
     s = np.linspace(0.0, length, count + 1)
-    tangent = _unit(hermite(nodes.s, nodes.tangent, 1j * nodes.curvature * nodes.tangent, s))
-    heading = _unit(hermite(nodes.s, nodes.heading, 1j * nodes.bend * nodes.heading, s))
+    tangent = unit(hermite(nodes.s, nodes.tangent, 1j * nodes.curvature * nodes.tangent, s))
+    heading = unit(hermite(nodes.s, nodes.heading, 1j * nodes.bend * nodes.heading, s))
     point = hermite(nodes.s, nodes.point, nodes.tangent, s)
     curvature, bend, slope = (np.interp(s, nodes.s, c) for c in (nodes.curvature, nodes.bend, nodes.bend_slope))
     slope[0], slope[-1] = _first_slope(bend[:3], s[1]), _first_slope(bend[:-4:-1], -s[1])
@@ -214,7 +214,3 @@ def _finer(nodes: _Nodes, count: int) -> float:
 
 def _where(s: Array, point: Plane, k: int) -> str:
     return f"at s = {s[k]:.3g} m, (x, y) = ({point[k].real:.3g}, {point[k].imag:.3g}) m"
-
-
-def _unit(direction: Plane) -> Plane:
-    return np.asarray(direction / np.abs(direction), dtype=np.complex128)

@@ -18,6 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from caster_gym.arrays import Array, Plane
+from caster_gym.paths.trajectory import unit
 from caster_gym.robot import Robot
 
 Pair: TypeAlias = tuple[Array, Array]
@@ -148,7 +149,7 @@ def _arcs(way: Plane, velocity: Plane, robot: Robot) -> tuple[Plane, Plane]:
 
 def _moved(psi: Plane, a: Plane, b: Plane) -> Plane:
     """psi after maps: the denominator b̄ psi + ā is psi times the conjugate of the numerator."""
-    end = _unit(a * psi + b)
+    end = unit(a * psi + b)
     end *= end
     end *= psi.conj()
     return end
@@ -172,8 +173,4 @@ def _first(way: Plane, heading: Plane) -> Plane:
     """Direction (P, N) of the first motion in ways (K, P, N); the heading (P,) where there is none."""
     moving = np.abs(way) > _LEAST_WAY
     first = np.take_along_axis(way, moving.argmax(axis=0)[None], axis=0)[0]
-    return _unit(np.where(moving.any(axis=0), first, heading[:, None]))
-
-
-def _unit(direction: Plane) -> Plane:
-    return np.asarray(direction / np.abs(direction), dtype=np.complex128)
+    return unit(np.where(moving.any(axis=0), first, heading[:, None]))

@@ -120,6 +120,11 @@ def tabulate(motion: tuple[Plane, Plane, Plane], turning: tuple[Plane, Array, Ar
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
+def unit(direction: Plane) -> Plane:
+    """Directions of length 1."""
+    return np.asarray(direction / np.abs(direction), dtype=np.complex128)
+
+
 def place(
     motion: tuple[Plane, Plane, Plane], heading: Plane, centre: tuple[float, float], rotation: float
 ) -> tuple[tuple[Plane, Plane, Plane], Plane]:

@@ -7,14 +7,9 @@ alone and in a batch; each feature has a stream of its own.
 from hashlib import blake2b
 
 import numpy as np
-from numpy.typing import NDArray
 
-from caster_gym.arrays import Array, Indices
-from caster_gym.envs.randomness import bits, episode_seed
-
-Seeds = NDArray[np.uint64]
-
-_SHIFT_11, _SHIFT_12 = np.uint64(11), np.uint64(12)
+from caster_gym.arrays import Array, Indices, Seeds
+from caster_gym.envs.randomness import bits, episode_seed, shifted
 
 
 def stream(place: int, kind: str) -> np.uint64:
@@ -28,17 +23,10 @@ def seeds_of(keys: Seeds, episodes: Seeds, of: np.uint64) -> Seeds:
     return seeds
 
 
-def uniforms(seeds: Seeds, indices: Indices) -> Array:
-    """Numbers (robots, k) in [0, 1) for seeds (robots,) and indices (k,) or (robots, k)."""
-    drawn: Seeds = bits(seeds[:, None], indices.astype(np.uint64)) >> _SHIFT_11
-    return drawn.astype(np.float64) * 2.0**-53
-
-
 def normals(seeds: Seeds, indices: Indices) -> Array:
     """Standard normal numbers (robots, k), by the inverse of their distribution."""
     from scipy.special import ndtri  # late: most environments make no noise
 
-    numbers: Array = ndtri(
-        ((bits(seeds[:, None], indices.astype(np.uint64)) >> _SHIFT_12).astype(np.float64) + 0.5) * 2.0**-52
-    )
+    drawn: Seeds = shifted(bits(seeds[:, None], indices.astype(np.uint64)), 12)
+    numbers: Array = ndtri((drawn.astype(np.float64) + 0.5) * 2.0**-52)
     return numbers

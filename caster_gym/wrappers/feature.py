@@ -13,7 +13,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pydantic import AfterValidator
 
-from caster_gym.arrays import Array, Flags, Indices
+from caster_gym.arrays import Array, Flags, Indices, Seeds
 from caster_gym.configuration import Frozen
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Actions: TypeAlias = NDArray[np.float32]
 Observations: TypeAlias = NDArray[np.float32]
-Seeds: TypeAlias = NDArray[np.uint64]
 Robots: TypeAlias = Indices | slice
 Quantities: TypeAlias = Callable[[str], Array]  # a quantity (robots, …) of the environment's info, by its name
 

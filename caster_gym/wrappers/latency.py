@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from caster_gym.arrays import Array
-from caster_gym.wrappers.draws import uniforms
+from caster_gym.envs.randomness import uniforms
 from caster_gym.wrappers.feature import Actions, Feature, Place, Quantities, Runtime, Size, between
 
 FIRST = np.zeros(1, dtype=np.int64)

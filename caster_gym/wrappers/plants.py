@@ -10,7 +10,8 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, NonNegativeFloat
 
-from caster_gym.arrays import Array, Indices
+from caster_gym.arrays import Array, Indices, Seeds
+from caster_gym.envs.randomness import uniforms
 from caster_gym.floor import GREATEST
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
@@ -19,7 +20,6 @@ from caster_gym.mechanics.parameters import (
     PlatformParameters,
     with_load,
 )
-from caster_gym.wrappers.draws import uniforms
 from caster_gym.wrappers.feature import (
     Feature,
     Observations,
@@ -29,7 +29,6 @@ from caster_gym.wrappers.feature import (
     Range,
     Robots,
     Runtime,
-    Seeds,
     Size,
     between,
     limits,

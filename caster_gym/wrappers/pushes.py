@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from caster_gym.arrays import Array
-from caster_gym.wrappers.draws import uniforms
+from caster_gym.envs.randomness import uniforms
 from caster_gym.wrappers.feature import Feature, Place, PushingRuntime, Quantities, Range, Runtime, Size, between
 
 _DRAWS = 4  # a control period: whether, how hard, whither, how twisting

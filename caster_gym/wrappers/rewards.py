@@ -8,6 +8,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.arrays import Array, Flags
 from caster_gym.configuration import ConfigurationError
+from caster_gym.envs.tracking import kernel
 from caster_gym.wrappers.feature import Feature, Place, Quantities, RewardRuntime, Runtime
 
 Shape: TypeAlias = Literal["gaussian", "long_tail", "linear", "quadratic"]
@@ -145,7 +146,7 @@ def falling(distance: Array, value_at_one: float, shape: Shape) -> Array:
     if shape == "gaussian":
         return np.exp(square * math.log(value_at_one))
     if shape == "long_tail":
-        return 1.0 / (1.0 + square * (1.0 / value_at_one - 1.0))
+        return np.asarray(kernel(square * (1.0 / value_at_one - 1.0), 1.0))
     reach = distance if shape == "linear" else square
     return np.maximum(1.0 - reach * (1.0 - value_at_one), 0.0)
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-KEPT = 4  # arrays of a shelf; whoever holds more gets ones that go back to the operating system
+KEPT = 4  # arrays of a pool; whoever holds more gets ones that go back to the operating system
 
 
-class Shelf:
+class BufferPool:
     """Arrays of one shape and type, uninitialised, each lent to whoever takes it until no reference to it is left.
 
     Views, Torch tensors and buffers refer to their array; a bare address does not.

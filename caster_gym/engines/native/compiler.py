@@ -23,6 +23,7 @@ from caster_gym.mechanics import (
     caster_masses,
     contact,
     contact_impulses,
+    contact_table,
     dynamics,
     first_contact,
     floor,
@@ -35,11 +36,13 @@ from caster_gym.mechanics import (
     linear,
     motors,
     plant,
+    room,
     scalars,
     separation,
     slip,
     slip_energy,
     slip_impact,
+    slip_state,
     slip_tilt,
 )
 
@@ -125,6 +128,7 @@ for _module in (scalars, linear, caster, dynamics, integration, motors, plant, g
 for _module in (
     separation,
     first_contact,
+    contact_table,
     contact_impulses,
     contact,
     caster_masses,
@@ -132,9 +136,11 @@ for _module in (
     floor_friction,
     floor,
     slip,
+    slip_state,
     slip_impact,
     slip_energy,
     slip_tilt,
     grip_or_slip,
+    room,
 ):
     teach(_module)

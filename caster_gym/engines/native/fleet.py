@@ -21,14 +21,7 @@ from caster_gym.engines.native.fleet_rows import (
     surface_of,
     torque_row,
 )
-from caster_gym.engines.native.guarding import (
-    borrowed_floor,
-    borrowed_hull,
-    borrowed_obstacles,
-    reach_of,
-    settled,
-    worth_measuring,
-)
+from caster_gym.engines.native.guarding import borrowed_floor, borrowed_hull, borrowed_obstacles, reach_of
 from caster_gym.engines.native.lanes import (
     BODY_ROWS,
     LANES,
@@ -45,7 +38,6 @@ from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
 from caster_gym.floor import FloorLike, load_floor
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.floor import floor_table, parameters_on, wrong_state
-from caster_gym.mechanics.free_casters import slip_velocity
 from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import (
@@ -57,9 +49,9 @@ from caster_gym.mechanics.parameters import (
     pack_parameters,
     unpack_parameters,
 )
-from caster_gym.mechanics.scalars import each
+from caster_gym.mechanics.room import should_measure, step_within_room
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance
-from caster_gym.mechanics.slip import rolling_state, unpack_slip_state
+from caster_gym.mechanics.slip_state import rolling_state, slips_of, unpack_slip_state
 from caster_gym.robot import Robot
 
 
@@ -71,7 +63,7 @@ def _measure(block: Any, lanes: Any, h: Any, hull: Any, obstacles: Any, casters:
     row = room_row(casters, floor)
     for lane in range(lanes):
         state = read_state(block, lane, 0, casters)
-        if worth_measuring(block[row * LANES + lane], state.twist, h, hull.reach):
+        if should_measure(block[row * LANES + lane], state.twist, h, hull.reach):
             gap = clearance(state.position, state.heading, hull, obstacles, 0, len(obstacles.radii))
             block[row * LANES + lane] = gap
 
@@ -99,7 +91,7 @@ def _step_lanes(
         torques = read_pairs(block, lane, torque_row(casters, floor), casters)
         robot = read_robot(block, lane, parameter_row(casters, floor), casters)
         target = free_step(state, torques, (0.0, 0.0, 0.0), h, robot, surface_of(block, lane, casters, floor))
-        end, room, _ = settled(obstacles, block[row * LANES + lane], state, target, h, reach)
+        end, room, _ = step_within_room(obstacles, block[row * LANES + lane], state, target, h, reach)
         write(block, lane, 0, end)
         block[row * LANES + lane] = room
     _take_care(block, here, h, hull, obstacles, casters, floor)
@@ -255,7 +247,7 @@ class Fleet:
         if self._floor is None:
             return np.zeros((self.count, len(self._casters), 2))
         now = unpack_slip_state(tuple(self.state.T))
-        slips = each(slip_velocity, (now.twist,), now.directions, now.rates, self._numbers().casters)
+        slips = slips_of(now, self._numbers())
         return np.moveaxis(np.array(slips), -1, 0)
 
     def _numbers(self) -> RobotParameters:

@@ -23,7 +23,7 @@ from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import pairs
-from caster_gym.mechanics.slip import rolling_state, unpack_slip_state
+from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 from caster_gym.robot import Robot
 
 BODY_ROWS = 7  # of a state before the casters' directions

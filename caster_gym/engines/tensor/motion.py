@@ -10,12 +10,12 @@ import caster_gym.engines.tensor.scalars  # noqa: F401 - makes tensors scalars o
 from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import FloorTable, Surface, floor_table, wheel_frictions
 from caster_gym.mechanics.ground import floor_use
-from caster_gym.mechanics.integration import State, derivative, pack_state, unit, unpack_state
+from caster_gym.mechanics.integration import State, derivative, pack_state, runge_kutta, unit, unpack_state
 from caster_gym.mechanics.motors import joint_torques, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.plant import all_motor_speeds, driven_step, power_between, slip_speeds
 from caster_gym.mechanics.scalars import each, flatten, pairs
-from caster_gym.mechanics.slip import unpack_slip_state
+from caster_gym.mechanics.slip_state import unpack_slip_state
 
 
 def driven_rows(
@@ -27,11 +27,7 @@ def driven_rows(
     with their power [W] (2 N + 1, robots); `caster_gym.mechanics.ground.FloorUse` (2, robots), or zeros unless asking.
     """
     torques, forces = _driven(bodies, commands, push, robot)
-    k1 = _rate(bodies, forces, robot)
-    k2 = _rate(bodies + 0.5 * h * k1, forces, robot)
-    k3 = _rate(bodies + 0.5 * h * k2, forces, robot)
-    k4 = _rate(bodies + h * k3, forces, robot)
-    end = bodies + h / 6.0 * k1 + h / 3.0 * k2 + h / 3.0 * k3 + h / 6.0 * k4  # as in `rk4_step`, to the last rounding
+    end = runge_kutta(_rate, _moved, bodies, h, (forces, robot))
     states, done = _arrived(bodies, end, torques, robot)
     asks = _asked(bodies, forces, robot) if asking else torch.zeros_like(bodies[:2])
     return states, done, asks
@@ -88,6 +84,10 @@ def _rate(bodies: Tensor, forces: Tensor, robot: RobotParameters) -> Tensor:
     *torques, x, y, z = forces.unbind(0)
     state = unpack_state(bodies.unbind(0))
     return torch.stack(pack_state(derivative(state, pairs(tuple(torques)), (x, y, z), robot)))
+
+
+def _moved(bodies: Tensor, h: float, rate: Tensor) -> Tensor:
+    return bodies + h * rate
 
 
 @torch.compiler.nested_compile_region

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from caster_gym.engines.free_wheels import check_free_wheels
 from caster_gym.engines.memory import check_memory
-from caster_gym.engines.native.buffer_pool import Shelf
+from caster_gym.engines.native.buffer_pool import BufferPool
 from caster_gym.engines.native.compilation import compilations, included
 from caster_gym.engines.native.held import Held
 from caster_gym.engines.native.lanes import LANES, block_count, from_lanes, to_lanes
@@ -103,10 +103,10 @@ class TaskEngine:
             substeps=self._pace.substeps,
             time_step=self._pace.time_step,
         )
-        self._shelves = (
-            Shelf((count, self.layout.size), np.float32),
-            Shelf((self._report_rows, count), np.float64),
-            Shelf((3, count), np.float64),
+        self._pools = (
+            BufferPool((count, self.layout.size), np.float32),
+            BufferPool((self._report_rows, count), np.float64),
+            BufferPool((3, count), np.float64),
         )
         self._observation_size = self.layout.size
         self._results = np.zeros(3)  # of a robot alone
@@ -118,7 +118,7 @@ class TaskEngine:
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy needs. All that compiled code refers to is put together anew around its arrays."""
-        rebuilt = ("_desk", "_world", "_shelves", "_observation_size", "_results", "_held")
+        rebuilt = ("_desk", "_world", "_pools", "_observation_size", "_results", "_held")
         state = {name: value for name, value in vars(self).items() if name not in rebuilt}
         return state | {"changing": self.changing}
 
@@ -187,7 +187,7 @@ class TaskEngine:
 
     def step(self, actions: NDArray[np.float32]) -> Outcome:
         """Move all robots for one control period under actions (robots, driven joints) in −1 … 1."""
-        observations, reports, results = (shelf.take() for shelf in self._shelves)
+        observations, reports, results = (pool.take() for pool in self._pools)
         views = layout.Views(observations, reports, results)
         over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
         if self._told is not None:

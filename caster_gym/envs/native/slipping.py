@@ -15,7 +15,7 @@ from caster_gym.mechanics.floor import FloorTable, Surface, own_friction, patch_
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import slip_speeds
 from caster_gym.mechanics.scalars import each, either, maximum
-from caster_gym.mechanics.slip import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state
 
 
 @register_jitable(**INLINE)

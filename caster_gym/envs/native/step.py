@@ -15,8 +15,6 @@ from caster_gym.engines.native.guarding import (
     borrowed_hull,
     borrowed_obstacles,
     reach_of,
-    settled,
-    worth_measuring,
 )
 from caster_gym.engines.native.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
 from caster_gym.envs import randomness
@@ -62,6 +60,7 @@ from caster_gym.envs.tracking import (
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import driven_step, guarded_driven_step
+from caster_gym.mechanics.room import should_measure, step_within_room
 from caster_gym.mechanics.scalars import add, clip, each, flatten, maximum
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance, separation
 
@@ -124,7 +123,7 @@ def _measure(desk: Any, first: Any, here: Any, obstacles: Any, world: World, siz
     row = room_row(sizes)
     for lane in range(here):
         state = read_state(desk, lane, 0, sizes.casters)
-        if worth_measuring(desk[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
+        if should_measure(desk[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
             near, end = _neighbourhood(first + lane, world)
             gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
             desk[row * LANES + lane] = gap
@@ -174,7 +173,7 @@ def _drive(desk: Any, first: Any, lanes: Any, here: Any, world: World, sizes: Si
             surface = surface_of(desk, lane, world.floor, sizes)
             target, drive = driven_step(state, commands, wrench, h, robot, surface)
             room = desk[room_at * LANES + lane]
-            end, room, went = settled(world.obstacles, room, state, target, h, reach)
+            end, room, went = step_within_room(world.obstacles, room, state, target, h, reach)
             mean = each(_scaled, (share * went,), (*flatten(drive.torques), drive.power))
             write(desk, lane, 0, end)
             write(desk, lane, rows, add(read(desk, lane, rows, mean), mean))

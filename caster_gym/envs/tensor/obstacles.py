@@ -23,7 +23,7 @@ from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.plant import guarded_driven_step, slip_speeds
 from caster_gym.mechanics.scalars import each, flatten, pairs, where
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance, separation
-from caster_gym.mechanics.slip import unpack_slip_state
+from caster_gym.mechanics.slip_state import unpack_slip_state
 
 _FAR = 1e6  # [m] where nobody comes
 

@@ -14,7 +14,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from caster_gym.engines.native.guarding import settled
 from caster_gym.engines.tensor.compiler import compiled
 from caster_gym.engines.tensor.fleet import BODY_ROWS
 from caster_gym.engines.tensor.motion import driven_rows, slipping_rows, surface_below, torch_floor
@@ -43,8 +42,9 @@ from caster_gym.envs.tracking import (
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
+from caster_gym.mechanics.room import step_within_room
 from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, total
-from caster_gym.mechanics.slip import rolling_state, unpack_slip_state
+from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 
 TaskName: TypeAlias = Literal["track", "follow"]
 
@@ -278,7 +278,7 @@ class TorchTask:
                 bodies = target
             else:
                 now, aim = self._state(bodies), self._state(target)
-                end, room, went = settled(around, room, now, aim, self._h, around.hull.reach)
+                end, room, went = step_within_room(around, room, now, aim, self._h, around.hull.reach)
                 bodies, went = torch.stack(end), went.to(self.dtype)
                 share, asks = share * went, went * asks
                 slips = None if slips is None else went * slips
