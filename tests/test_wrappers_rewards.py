@@ -20,7 +20,7 @@ from caster_gym.wrappers import (
     read_features,
     wrap,
 )
-from caster_gym.wrappers.rewards import falling, shaping
+from caster_gym.wrappers.rewards import falloff, shaping
 
 PATH = {"shape": "circle", "radius": 0.5}
 ROBOT = load_robot("chung2008")
@@ -176,13 +176,13 @@ def test_clearance_can_be_kept():
 def test_worth_is_one_within_bounds_and_falls_to_its_value_at_the_margin(shape):
     values = np.array([-5.0, 0.5, 1.0, 2.0, 3.0, 3.5, 5.0, np.nan, np.inf])
     term = Tolerance(quantity="power", bounds=(1.0, 3.0), margin=2.0, value_at_margin=0.2, shape=shape)
-    worth = term.worth(values)
+    worth = term.falloff(values)
     assert_array_equal(worth[2:5], 1.0)
     assert_allclose(worth[6], 0.2, rtol=1e-12)
     assert worth[1] == worth[5]  # both 0.5 outside
     assert 0.2 < worth[5] < 1.0
     assert_array_equal(worth[7:], 0.0)
-    outside = falling(np.linspace(0.0, 5.0, 500), 0.2, shape)
+    outside = falloff(np.linspace(0.0, 5.0, 500), 0.2, shape)
     assert (np.diff(outside) <= 0.0).all()
     assert outside.min() >= 0.0
 
@@ -192,16 +192,16 @@ def test_halfway_to_the_margin():
     half = np.array([0.5])
     expected = {"gaussian": 0.2**0.25, "long_tail": 0.5, "linear": 0.6, "quadratic": 0.8}
     for shape, value in expected.items():
-        assert_allclose(falling(half, 0.2, shape), value, rtol=1e-12)
+        assert_allclose(falloff(half, 0.2, shape), value, rtol=1e-12)
 
 
 def test_bounds_may_be_open_and_margins_sharp():
     values = np.array([-1.0, 0.29, 0.3, 1e9, np.inf])
     sharp = Tolerance(quantity="clearance", bounds=(0.3, None))
-    assert_array_equal(sharp.worth(values), [0.0, 0.0, 1.0, 1.0, 1.0])
+    assert_array_equal(sharp.falloff(values), [0.0, 0.0, 1.0, 1.0, 1.0])
     below = Tolerance(quantity="clearance", bounds=(None, 0.3), margin=0.1, shape="linear", value_at_margin=0.0)
-    assert_allclose(below.worth(values[:3]), 1.0)
-    assert_array_equal(below.worth(values[3:]), 0.0)
+    assert_allclose(below.falloff(values[:3]), 1.0)
+    assert_array_equal(below.falloff(values[3:]), 0.0)
 
 
 def test_rewards_stay_finite_when_a_state_does_not():

@@ -20,7 +20,7 @@ from caster_gym.arrays import Array, Flags, Indices, Plane
 from caster_gym.mechanics.actuation import motor_wrenches
 from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import bias, caster_drive, inertia, inverse_dynamics, resistance
-from caster_gym.mechanics.linear import dot, multiply
+from caster_gym.mechanics.linear import dot, multiply, scale
 from caster_gym.mechanics.motors import motor_speeds, torque_range
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, add, each, flatten
@@ -120,12 +120,12 @@ def limits_along(ways: Ways, lines: Sequence[Line], robot: Robot, speed_limit: f
     m = inertia(directions, numbers)
     smooth = numbers._replace(casters=tuple(c._replace(roll_coulomb=0.0, steer_coulomb=0.0) for c in numbers.casters))
     viscous = resistance(q, directions, smooth)
-    whole = resistance(_times(top, q), directions, numbers)
+    whole = resistance(scale(top, q), directions, numbers)
     forces = (
         multiply(m, q),
         add(multiply(m, q_slope), bias(q, directions, numbers)),
         viscous,
-        add(whole, _times(-top, viscous)),
+        add(whole, scale(-top, viscous)),
     )
     shares = [_shares(force, directions, numbers) for force in forces]
     planes = []
@@ -180,8 +180,8 @@ def _broken(ways: Ways, law: _Law, robot: RobotParameters, most: float) -> tuple
     q, q_slope, directions = _motion(ways.points, ways.psi)
     share = np.linspace(0.0, 1.0, len(q[2]))[:, None]
     x = law.start + share * (law.end - law.start)
-    v = _times(np.sqrt(np.maximum(x, 0.0)), q)
-    force = inverse_dynamics(v, directions, add(_times(law.u, q), _times(x, q_slope)), robot)
+    v = scale(np.sqrt(np.maximum(x, 0.0)), q)
+    force = inverse_dynamics(v, directions, add(scale(law.u, q), scale(x, q_slope)), robot)
     shares, lack = _shares(force, directions, robot)
     speeds = flatten(each(_turns, (v,), directions, robot.casters))
     tops = flatten(each(_top_speeds, (), robot.casters))
@@ -269,10 +269,6 @@ def _turns(q: Vector, f: Direction, caster: CasterParameters) -> tuple[Array, Ar
 
 def _top_speeds(caster: CasterParameters) -> tuple[float, float]:
     return caster.roll_max_speed, caster.steer_max_speed
-
-
-def _times(factor: Array, v: Vector) -> Vector:
-    return factor * v[0], factor * v[1], factor * v[2]
 
 
 def _shares(force: Vector, directions: tuple[Direction, ...], robot: RobotParameters) -> tuple[list[Array], Array]:

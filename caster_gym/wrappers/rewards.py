@@ -24,7 +24,7 @@ OF_THE_STATE = (
 """Quantities that say where the robot is, not what was done: a potential may depend on these."""
 
 
-class Worth(Feature):
+class RewardShape(Feature):
     """How good a value of a quantity is: 1 within bounds, falling outside to value_at_margin at a margin from them."""
 
     quantity: str  # name of a number in info
@@ -32,7 +32,7 @@ class Worth(Feature):
     margin: NonNegativeFloat = 0.0  # [unit of the quantity] 0: worth nothing outside
     value_at_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
     shape: Shape = "gaussian"
-    weight: float = 1.0  # reward for a worth of 1
+    weight: float = 1.0  # reward for a value of 1
     name: str | None = None  # of the term; by default that of the kind and the quantity
 
     @model_validator(mode="after")
@@ -44,18 +44,22 @@ class Worth(Feature):
             raise ValueError(f"a {self.shape} shape never reaches a value_at_margin of 0; 'linear' and 'quadratic' do")
         return self
 
-    def worth(self, values: Array) -> Array:
+    def reward(self, quantities: Quantities) -> Array:
+        """weight · shape of the quantity."""
+        return self.weight * self.falloff(number(quantities, self.quantity))
+
+    def falloff(self, values: Array) -> Array:
         """1 within bounds, less outside, never below 0; 0 for what is not a number."""
         low, high = (-np.inf if self.bounds[0] is None else self.bounds[0]), self.bounds[1]
         outside = np.maximum(np.maximum(low - values, 0.0), 0.0 if high is None else values - high)
         if self.margin == 0.0:
             return np.where(outside == 0.0, 1.0, 0.0)
-        worth = falling(outside / self.margin, self.value_at_margin, self.shape)
-        return np.where(np.isnan(values), 0.0, worth)
+        shape = falloff(outside / self.margin, self.value_at_margin, self.shape)
+        return np.where(np.isnan(values), 0.0, shape)
 
 
-class Potential(Worth):
-    """Shaping by a potential Φ = weight · worth of a quantity of the state: γ Φ(s′) − Φ(s), with Φ = 0 after failure.
+class Potential(RewardShape):
+    """Shaping by a potential Φ = weight · shape of a quantity of the state: γ Φ(s′) − Φ(s), with Φ = 0 after failure.
 
     It leaves every optimal policy optimal if the discount γ is the learner's (Ng, Harada and Russell, ICML 1999). An
     episode that is cut off by time keeps the potential of its last state.
@@ -81,8 +85,8 @@ class Potential(Worth):
         return _Potential(self, place)
 
 
-class Tolerance(Worth):
-    """weight · worth of a quantity after the step."""
+class Tolerance(RewardShape):
+    """weight · shape of a quantity after the step."""
 
     kind: Literal["tolerance"] = "tolerance"
 
@@ -137,10 +141,10 @@ class Impact(Feature):
 
     def runtime(self, place: Place) -> Runtime:
         """The term."""
-        return _Impact(self)
+        return _Impact(self.name, self.weight)
 
 
-def falling(distance: Array, value_at_one: float, shape: Shape) -> Array:
+def falloff(distance: Array, value_at_one: float, shape: Shape) -> Array:
     """A function of a distance >= 0 that is 1 at 0 and the given value at 1."""
     square: Array = np.square(distance)
     if shape == "gaussian":
@@ -176,14 +180,11 @@ class _Potential(RewardRuntime):
         self._now = np.zeros(place.count)
 
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
-        self._now[robots] = self._potential(quantities)[robots]
+        self._now[robots] = self._feature.reward(quantities)[robots]
 
     def term(self, quantities: Quantities, terminated: Flags) -> Array:
-        before, self._now = self._now, self._potential(quantities)
+        before, self._now = self._now, self._feature.reward(quantities)
         return shaping(before, self._now, self._feature.discount, terminated)
-
-    def _potential(self, quantities: Quantities) -> Array:
-        return self._feature.weight * self._feature.worth(number(quantities, self._feature.quantity))
 
 
 class _Tolerance(RewardRuntime):
@@ -195,7 +196,7 @@ class _Tolerance(RewardRuntime):
         number(quantities, self._feature.quantity)  # so that an unknown one is refused at once
 
     def term(self, quantities: Quantities, terminated: Flags) -> Array:
-        return self._feature.weight * self._feature.worth(number(quantities, self._feature.quantity))
+        return self._feature.reward(quantities)
 
 
 class _OfTorques(RewardRuntime):
@@ -242,15 +243,15 @@ class _Traction(RewardRuntime):
 
 
 class _Impact(RewardRuntime):
-    def __init__(self, feature: Impact) -> None:
-        super().__init__(feature.name)
-        self._feature = feature
+    def __init__(self, name: str, weight: float) -> None:
+        super().__init__(name)
+        self._weight = weight
 
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
         quantities("normal_impulse")
 
     def term(self, quantities: Quantities, terminated: Flags) -> Array:
-        return -self._feature.weight * finite(quantities("normal_impulse"))
+        return -self._weight * finite(quantities("normal_impulse"))
 
 
 def _mean_square(shares: Array) -> Array:
