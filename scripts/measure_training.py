@@ -26,22 +26,21 @@ from tqdm import tqdm
 
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
 from caster_gym.agents.comparison.metrics import yardstick
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import (
-    ComputedTorqueSettings,
-    LearnedSettings,
+from caster_gym.agents.learning.bundle import load_policy
+from caster_gym.agents.learning.sb3_environment import SB3VecEnv
+from caster_gym.agents.learning.sb3_learning import make_learner
+from caster_gym.agents.learning.settings import (
+    LearnerSettings,
     PPOSettings,
     RslPPOSettings,
     SHACSettings,
-    read_agent,
 )
-from caster_gym.agents.learning.bundle import load_policy
-from caster_gym.agents.learning.sb3_environment import SB3VecEnv
-from caster_gym.agents.learning.sb3_learning import learn_with_sb3, make_learner
-from caster_gym.agents.learning.shac import ShortHorizon, learn_through_simulator, make_task
+from caster_gym.agents.learning.shac import ShortHorizon, make_task
 from caster_gym.agents.learning.training_run import Run
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.registry import read_agent
 from caster_gym.engines.native.threads import set_threads
 from caster_gym.report.provenance import command_line
 from caster_gym.report.run_folder import check_can_be_made
@@ -116,7 +115,7 @@ class TimedRun(Run):
     """A training run that counts seconds of the processor, those of validations left out."""
 
     def __init__(
-        self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, bar: "tqdm[Any]"
+        self, folder: Path, task: TaskSettings, settings: LearnerSettings, seed: int, bar: "tqdm[Any]"
     ) -> None:
         super().__init__(folder, task, settings, seed, lambda steps, verdict: _show(bar, steps, verdict))
         self.points: list[Point] = []
@@ -189,12 +188,12 @@ def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
     return measure
 
 
-def train_timed(name: str, task: TaskSettings, settings: LearnedSettings, seed: int) -> Course:
+def train_timed(name: str, task: TaskSettings, settings: LearnerSettings, seed: int) -> Course:
     """Train to the end of the settings, as in a process of its own: what Torch has compiled it gets from the disk."""
     torch.compiler.reset()
     with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.steps, desc=f"{name}, seed {seed}") as bar:
         timed = TimedRun(Path(folder), task, settings, seed, bar)
-        way_of_learning(settings)(timed, settings)
+        settings.learn(timed)
         timed.logger.close()
         return Course(name, seed, tuple(timed.points), trials(task, load_policy(Path(folder) / "best").agent))
 
@@ -207,17 +206,6 @@ def trials(task: TaskSettings, agent: Agent) -> tuple[Trial, ...]:
     metrics = how.measure(episodes, how.settling)
     told = zip(episodes.names, metrics.position_rmse.tolist(), metrics.failed.tolist(), strict=True)
     return tuple(Trial(path, error, failed > 0.0) for path, error, failed in told)
-
-
-def way_of_learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:
-    """Who learns with such settings."""
-    if isinstance(settings, SHACSettings):
-        return learn_through_simulator
-    if isinstance(settings, RslPPOSettings):
-        from caster_gym.agents.learning.rsl_rl import learn_with_rsl_rl
-
-        return learn_with_rsl_rl
-    return learn_with_sb3
 
 
 def window_costs(task: TaskSettings, settings: SHACSettings) -> WindowCosts:
@@ -248,7 +236,7 @@ def _first_window(task: TaskSettings, settings: SHACSettings) -> tuple[ShortHori
     return learner, processor_seconds() - begun
 
 
-def rate_on_tensors(task: TaskSettings, settings: LearnedSettings) -> float:
+def rate_on_tensors(task: TaskSettings, settings: LearnerSettings) -> float:
     """Control periods of training per second of the processor; the first round, which compiles, is not counted."""
     if not isinstance(settings, RslPPOSettings):
         raise ValueError(f"only PPO on tensors is measured without its error, got algorithm {settings.algorithm!r}")
@@ -258,17 +246,18 @@ def rate_on_tensors(task: TaskSettings, settings: LearnedSettings) -> float:
     torch.compiler.reset()
     with tempfile.TemporaryDirectory() as folder:
         counted = Run(Path(folder), task, settings, 0, lambda _steps, _verdict: starts.append(processor_seconds()))
-        way_of_learning(settings)(counted, settings)
+        settings.learn(counted)
         counted.logger.close()
     return round_ / middle(np.diff(starts)[1:])
 
 
-def read_learner(name: str, changes: Mapping[str, Any]) -> LearnedSettings:
+def read_learner(name: str, changes: Mapping[str, Any]) -> LearnerSettings:
     """Settings of an agent that learns."""
-    if isinstance(read_agent(name), ComputedTorqueSettings):
+    settings = read_agent(name)
+    if not isinstance(settings, LearnerSettings):
         raise ValueError(f"agent {name!r} does not learn, so that there is no time to measure")
     settings = read_agent(name, changes)
-    assert not isinstance(settings, ComputedTorqueSettings)  # changes leave the algorithm as it is
+    assert isinstance(settings, LearnerSettings)  # changes leave the algorithm as it is
     return settings
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from caster_gym.agents.comparison.metrics import Verdict
-from caster_gym.agents.learning.agent_settings import LearnedSettings
+from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.report.pages import join_parts, paragraph
 from caster_gym.report.provenance import versions
@@ -71,11 +71,11 @@ class WindowCosts(NamedTuple):
 class Results(NamedTuple):
     """All that was measured."""
 
-    agents: Mapping[str, LearnedSettings]
+    agents: Mapping[str, LearnerSettings]
     share: Values
     courses: Sequence[Course]
     costs: Mapping[str, WindowCosts]
-    rates: Mapping[str, tuple[LearnedSettings, float]]  # of learners on tensors [steps/s]
+    rates: Mapping[str, tuple[LearnerSettings, float]]  # of learners on tensors [steps/s]
     beside: Beside | None = None  # training with one thread and with two, beside busy processes
 
 

@@ -330,8 +330,8 @@ def test_commands_try_their_folder_before_they_compute(call, tmp_path, monkeypat
     (tmp_path / "recording.csv").touch()
     for place in (
         "caster_gym.agents.learning.training.train",
-        "caster_gym.agents.comparison.benchmark.compare",
-        "caster_gym.agents.comparison.benchmark.run_benchmark",
+        "caster_gym.agents.commands.evaluate.compare",
+        "caster_gym.agents.commands.benchmark.run_benchmark",
         "caster_gym.design.command.make_design",
         "caster_gym.identification.fit.identify",
     ):

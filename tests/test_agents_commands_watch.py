@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
 from caster_gym.agents.commands import watch as module
+from caster_gym.agents.commands.selection import choose_agent
 from caster_gym.agents.commands.watch import watch
-from caster_gym.agents.comparison.benchmark import ready_agent
 from caster_gym.agents.control.keyboard import (
     KEYS,
     SLOWING,
@@ -79,7 +79,7 @@ def test_several_robots_are_shown_until_the_last_has_ended(setup):
     """The circle takes longer than the random paths; their robots stay where they ended."""
     settings = module.read_settings(module.TaskSettings, "tasks", "task.yaml")
     batch = module._batch(settings, 3)
-    agent = ready_agent("agent.yaml", settings, batch)
+    agent = choose_agent("agent.yaml", settings, batch).agent
     shown = list(module._scenes(agent, batch, np.arange(3), seed=0, once=True))
     times = np.array([[scene.time for scene in scenes] for scenes in shown])
     assert_allclose(times[STEPS], STEPS * 0.02)

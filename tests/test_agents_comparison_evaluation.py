@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.agents.comparison.evaluation import Episodes, bare, roll_out, test_batch, training_batch
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
-from caster_gym.agents.settings import TaskSettings
 from caster_gym.configuration import parse
 
 test_batch.__test__ = False  # a name that pytest would take for a test

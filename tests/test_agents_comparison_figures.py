@@ -12,9 +12,9 @@ from matplotlib.patches import Circle, Polygon
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.comparison.figures import draw_learning, draw_obstacles, draw_path, draw_speeds, learning_curves
 from caster_gym.agents.comparison.follow_metrics import FollowVerdict
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.computed_torque import ComputedTorque
-from caster_gym.agents.learning.training_run import Validation
-from caster_gym.agents.settings import TaskSettings
 from caster_gym.configuration import parse
 
 test_batch.__test__ = False  # a name that pytest would take for a test

@@ -12,10 +12,10 @@ from safetensors.torch import load_file, save_file
 from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.learning import bundle as module
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import PPOSettings, SACSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_policy, save_bundle
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import actor_of, make_learner
+from caster_gym.agents.learning.settings import PPOSettings, SACSettings
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.follow_task import FollowTask

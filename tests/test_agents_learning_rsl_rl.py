@@ -10,11 +10,12 @@ import yaml
 from gymnasium.error import DependencyNotInstalled
 from rsl_rl.env import VecEnv
 
-from caster_gym.agents.learning.agent_settings import RslPPOSettings, read_agent
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.rsl_rl import RslVecEnv, actor_of, make_runner
+from caster_gym.agents.learning.settings import RslPPOSettings
 from caster_gym.agents.learning.training import train
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 

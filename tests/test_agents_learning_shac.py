@@ -6,11 +6,12 @@ import torch
 import yaml
 
 from caster_gym import load_robot
-from caster_gym.agents.learning.agent_settings import SHACSettings, read_agent
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.bundle import load_policy
+from caster_gym.agents.learning.settings import SHACSettings
 from caster_gym.agents.learning.shac import Critic, ShortHorizon, Window, frozen, make_task, td_lambda
 from caster_gym.agents.learning.training import train
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.envs.track_task import TrackTask

@@ -11,11 +11,12 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import caster_gym
 from caster_gym.agents.comparison import evaluation
 from caster_gym.agents.comparison.evaluation import roll_out
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.track_metrics import TrackVerdict, measure
-from caster_gym.agents.learning.agent_settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings, read_agent
 from caster_gym.agents.learning.bundle import load_policy
+from caster_gym.agents.learning.settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.agents.learning.training import train
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import parse
 from caster_gym.engines.native.threads import get_threads
 from caster_gym.engines.tensor.threads import DEFAULT

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from caster_gym.agents.comparison.benchmark import read_comparison
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.configuration import ConfigurationError, Frozen, parse
 from caster_gym.design.command import read_design
 from caster_gym.file_names import FileName, NameOrFile, from_working_folder, is_file_name

@@ -21,9 +21,10 @@ from caster_gym.agents.commands.command_line import (
     plain_errors,
     progress,
 )
-from caster_gym.agents.learning.agent_settings import ComputedTorqueSettings, read_agent
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
-from caster_gym.report.run_folder import begun, check_file, check_free, staged
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.learning.settings import LearnerSettings
+from caster_gym.agents.registry import read_agent
+from caster_gym.report.run_folder import begun, check_file
 from caster_gym.shipped_files import read_settings
 
 MJCF_SUFFIXES = (".xml", ".mjcf")
@@ -67,7 +68,7 @@ def train(
         from caster_gym.agents.learning.training import train as run
 
         settings = read_agent(agent, changes_of(change))
-        if isinstance(settings, ComputedTorqueSettings):
+        if not isinstance(settings, LearnerSettings):
             raise ValueError(f"agent {agent!r} does not learn; try it with `caster-gym evaluate {agent}`")
         tasks = read_settings(TaskSettings, "tasks", task)
         kept = files_among(agent, task, tasks.robot)
@@ -95,28 +96,9 @@ def evaluate(
 ) -> None:
     """Try an agent on the test paths of a task, a policy on those of its own: a table, all episodes as CSV, figures."""
     with plain_errors():
-        from caster_gym.agents.comparison.benchmark import Contender, compare, ready_agent
-        from caster_gym.agents.comparison.evaluation import bare, test_batch
-        from caster_gym.agents.comparison.figures import write_figures
-        from caster_gym.agents.comparison.summary import table, write_episodes, write_summary
-        from caster_gym.agents.learning.trained_task import choose_task
-        from caster_gym.engines.tensor.threads import limited_to
-        from caster_gym.report.provenance import write_provenance
+        from caster_gym.agents.commands.evaluate import evaluate as run
 
-        tasks, words = choose_task(policy, task)
-        settings = BenchmarkSettings(agents=(policy,), starts=starts)
-        for read in files_among(task, tasks.robot):
-            check_free(out, overwrite, kept=read)
-        with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
-            test = test_batch(tasks, tasks.test, starts)
-            agent = ready_agent(policy, tasks, test)
-            results, episodes = compare([Contender(agent.name, agent, None)], test, settings)
-            text = f"{words}\n\n{table(results, settings.confidence)}"
-            write_episodes(folder / "episodes.csv", results)
-            write_summary(folder / "summary.csv", results, settings.confidence)
-            (folder / "table.md").write_text(text + "\n", encoding="utf-8")
-            write_figures(folder, episodes, {}, bare(test).engine.plan)
-            write_provenance(folder, policy=policy, task=tasks.model_dump(mode="json"), starts=starts, threads=threads)
+        text = run(policy, task, starts, out, overwrite, threads)
         typer.echo(text)
         typer.echo(f"Results and figures are in {out}.")
 
@@ -131,7 +113,7 @@ def benchmark(
 ) -> None:
     """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
     with plain_errors():
-        from caster_gym.agents.comparison.benchmark import read_comparison, run_benchmark
+        from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
@@ -161,8 +143,8 @@ def watch(
 ) -> None:
     """Show an agent on the test paths of a task, a policy on its own, or drive yourself: in a window or a film."""
     with plain_errors():
+        from caster_gym.agents.commands.selection import choose_task
         from caster_gym.agents.commands.watch import watch as run
-        from caster_gym.agents.learning.trained_task import choose_task
         from caster_gym.engines.tensor.threads import DEFAULT, limited_to
 
         settings, words = choose_task(agent, task)

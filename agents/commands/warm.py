@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from caster_gym.agents.settings import ChosenTask, TaskSettings
+from caster_gym.agents.comparison.task_settings import ChosenTask, TaskSettings
 from caster_gym.arena.arena import Arena
 from caster_gym.engines.native.compilation import compilations, included
 from caster_gym.engines.native.compiled_files import roots, version

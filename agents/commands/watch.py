@@ -9,11 +9,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from caster_gym.agents.comparison.benchmark import ready_agent
+from caster_gym.agents.commands.selection import choose_agent
 from caster_gym.agents.comparison.evaluation import Batch, bare, make_batch
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.keyboard import KeyboardDriver, keys_of_window
 from caster_gym.agents.control.protocol import Agent
-from caster_gym.agents.settings import TaskSettings
 from caster_gym.envs.scene import Scene
 from caster_gym.paths.naming import unknown_name
 from caster_gym.render.recording import check_target, recording
@@ -64,7 +64,7 @@ def watch(
     if driving:
         controller = KeyboardDriver(engine.layout, period, keys_of_window)
     else:
-        controller = ready_agent(agent, settings, batch)
+        controller = choose_agent(agent, settings, batch).agent
     end = np.inf if seconds is None else round(seconds / period)
     longest = np.inf if driving else int(engine.plan.guide.spans[paths, 2].max())
     mode = "rgb_array" if save is not None and not driving else "human"

@@ -6,8 +6,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from caster_gym.agents.comparison.task_settings import Paths, TaskSettings
 from caster_gym.agents.control.protocol import Agent
-from caster_gym.agents.settings import Paths, TaskSettings
 from caster_gym.arrays import Array
 from caster_gym.envs.caster_follow import CasterFollowVectorEnv
 from caster_gym.envs.caster_track import CasterTrackVectorEnv

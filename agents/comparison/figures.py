@@ -8,7 +8,7 @@ import numpy as np
 
 from caster_gym.agents.comparison.evaluation import Episodes
 from caster_gym.agents.comparison.measuring import Printed, shown
-from caster_gym.agents.learning.training_run import Validation
+from caster_gym.agents.comparison.validation import Validation
 from caster_gym.envs.native.reference import Courses
 from caster_gym.envs.plan import Plan
 from caster_gym.report.figures import COLOURS, legend_below, new_figure

@@ -7,11 +7,14 @@
 With the exact model every error obeys ë + k_d ė + k_p e = 0 while no motor is at its limit.
 """
 
-from typing import Literal, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat
 
+from caster_gym.agents.control.protocol import ControllerSettings
 from caster_gym.analysis.actuation import warn_if_singular
 from caster_gym.arrays import Array
 from caster_gym.control.torque_distribution import distribute
@@ -126,3 +129,28 @@ class ComputedTorque:
         jerk = 2.0 * (later - velocity - horizon * now) / horizon**2
         mean: Array = now + 0.5 * self.period * jerk
         return mean
+
+
+class ComputedTorqueSettings(ControllerSettings):
+    """Model-based control; its natural frequency is the one of those listed that does best on validation paths."""
+
+    usual_names: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(
+            ("natural_frequency", "bandwidth"),
+            "it is chosen among the 'natural_frequencies' listed, e.g. natural_frequencies: [10.0]",
+        ),
+        **dict.fromkeys(
+            ("kp", "kd"), "gains follow from the natural frequency: list it as natural_frequencies: [10.0]"
+        ),
+    }
+    algorithm: Literal["computed torque"]
+    known: KnownModel = "exact"
+    natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
+
+    def controller(self, layout: ObservationLayout, period: float) -> ComputedTorque:
+        """The controller with the first natural frequency."""
+        return ComputedTorque(layout, self.natural_frequencies[0], period, self.known)
+
+    def candidates(self) -> Sequence[Self]:
+        """The same settings with each natural frequency alone."""
+        return [self.model_copy(update={"natural_frequencies": (one,)}) for one in self.natural_frequencies]

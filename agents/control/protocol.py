@@ -1,9 +1,17 @@
-"""What every agent is, model-based or learned: a function from observations to actions."""
+"""What every agent is, model-based or learned, and what the settings of a model-based controller say."""
 
-from typing import Protocol
+import hashlib
+import sys
+from abc import abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from caster_gym.configuration import Frozen
+from caster_gym.envs.observation import ObservationLayout
 
 
 class Agent(Protocol):
@@ -17,3 +25,30 @@ class Agent(Protocol):
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (robots, driven joints) in −1 … 1 for observations (robots, size)."""
         ...
+
+
+class AgentSettings(Frozen):
+    """Settings of an agent, as its YAML file gives them."""
+
+    algorithm: str  # a name in caster_gym.agents.registry, or module:Name of a class like this one
+
+    @property
+    def source(self) -> dict[str, str]:
+        """The module that defines the agent and its version; without a version, the SHA-256 of its file."""
+        module = sys.modules[type(self).__module__]
+        version = getattr(sys.modules[module.__name__.partition(".")[0]], "__version__", None)
+        if version is None and module.__file__ is not None:
+            version = f"sha256:{hashlib.sha256(Path(module.__file__).read_bytes()).hexdigest()}"
+        return {"module": module.__name__, "version": str(version)}
+
+
+class ControllerSettings(AgentSettings):
+    """Settings of a model-based controller, which does not learn."""
+
+    @abstractmethod
+    def controller(self, layout: ObservationLayout, period: float) -> Agent:
+        """The controller that acts on observations of this layout, once every period [s]."""
+
+    def candidates(self) -> Sequence[Self]:
+        """Settings to try on the validation paths, where the best are chosen; by default, only these."""
+        return [self]

@@ -22,6 +22,11 @@ class Actor(nn.Module):
         self.head = nn.Linear(widths[-1], outputs)
         self.squash = squash
 
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """Units of each hidden layer."""
+        return tuple(len(layer.bias) for layer in self.layers if isinstance(layer, nn.Linear))
+
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Actions in −1 … 1."""
         for layer in self.layers:

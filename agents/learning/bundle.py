@@ -18,8 +18,8 @@ from pydantic import PositiveInt
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
+from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
-from caster_gym.agents.settings import ChosenTask, in_brief
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.observation import ObservationLayout

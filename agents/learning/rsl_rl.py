@@ -10,7 +10,7 @@ from gymnasium.error import DependencyNotInstalled
 from torch import Tensor
 
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import RslPPOSettings
+from caster_gym.agents.learning.settings import RslPPOSettings
 from caster_gym.agents.learning.tensors import torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv

@@ -9,8 +9,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import Learner, PPOSettings, SACSettings
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
+from caster_gym.agents.learning.settings import PPOSettings, SACSettings
 from caster_gym.agents.learning.training_run import Run
 
 
@@ -54,7 +54,7 @@ def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, se
     )
 
 
-def actor_of(learner: BaseAlgorithm, settings: Learner) -> Actor:
+def actor_of(learner: BaseAlgorithm, settings: PPOSettings | SACSettings) -> Actor:
     """The deterministic part of a learner's policy, with a copy of its weights."""
     policy: Any = learner.policy
     if isinstance(learner, PPO):
@@ -71,9 +71,9 @@ def actor_of(learner: BaseAlgorithm, settings: Learner) -> Actor:
 class Watcher(BaseCallback):
     """Tells a run how far SB3 is."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, settings: PPOSettings | SACSettings) -> None:
         super().__init__()
-        self.run = run
+        self.run, self.settings = run, settings
 
     def _on_step(self) -> bool:
         if isinstance(self.model, SAC):
@@ -85,7 +85,7 @@ class Watcher(BaseCallback):
             self._watch()
 
     def _watch(self) -> None:
-        self.run.advance(self.num_timesteps, lambda: actor_of(self.model, self.run.settings))
+        self.run.advance(self.num_timesteps, lambda: actor_of(self.model, self.settings))
 
 
 def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
@@ -93,7 +93,7 @@ def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
     learner = make_learner(settings, SB3VecEnv(training_batch(run.task, settings.robots)), run.seed)
     learner.set_logger(run.logger)
     try:
-        learner.learn(settings.steps, callback=Watcher(run))
+        learner.learn(settings.steps, callback=Watcher(run, settings))
     except ValueError as error:
         if "of distribution" in str(error):  # as Torch says of actions that are drawn from no numbers
             run.diverged(learner.num_timesteps, error)

@@ -15,11 +15,11 @@ import torch
 from torch import Tensor, nn
 
 from caster_gym import load_robot
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import SHACSettings
+from caster_gym.agents.learning.settings import SHACSettings
 from caster_gym.agents.learning.tensors import check_compiler, torch_fields
 from caster_gym.agents.learning.training_run import Run
-from caster_gym.agents.settings import TaskSettings
 from caster_gym.engines.time_step import longest_time_step, substeps_for
 from caster_gym.envs.tensor.task import TaskOutcome, TorchTask
 

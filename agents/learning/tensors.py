@@ -4,8 +4,8 @@ from typing import Any
 
 import torch
 
-from caster_gym.agents.learning.agent_settings import OnTensors
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.learning.settings import OnTensors
 
 
 def torch_fields(task: TaskSettings) -> dict[str, Any]:

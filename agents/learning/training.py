@@ -1,33 +1,39 @@
-"""Training a policy, by Stable-Baselines3 or on tensors; the best one is chosen on validation paths.
+"""Training policies, one or many at a time; the best of each run is chosen on validation paths.
 
 With the same settings, seed, number of threads and versions on the same machine, a training run repeats bit for bit.
 """
 
-from collections.abc import Callable
+import multiprocessing
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from caster_gym.agents.learning.agent_settings import LearnedSettings, RslPPOSettings, SHACSettings
-from caster_gym.agents.learning.sb3_learning import learn_with_sb3
-from caster_gym.agents.learning.training_run import Report, Run, Validation
-from caster_gym.agents.settings import TaskSettings
+from tqdm import tqdm
+
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.comparison.validation import Validation
+from caster_gym.agents.learning.settings import LearnerSettings
+from caster_gym.agents.learning.training_run import Report, Run
+from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limited_to
 from caster_gym.report.provenance import write_provenance
 
 
 def train(
-    task: TaskSettings, settings: LearnedSettings, seed: int, folder: Path, report: Report, threads: int = DEFAULT
+    task: TaskSettings, settings: LearnerSettings, seed: int, folder: Path, report: Report, threads: int = DEFAULT
 ) -> Validation:
     """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
     Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
     """
-    learn = _learning(settings)
     run = Run(folder, task, settings, seed, report)
     completed = False
     try:
         with limited_to(threads):
-            learn(run, settings)
+            settings.learn(run)
         completed = True
     finally:
         if run.history:
@@ -35,6 +41,7 @@ def train(
                 folder,
                 task=task.model_dump(mode="json"),
                 agent=settings.model_dump(mode="json"),
+                source=settings.source,
                 seed=seed,
                 threads=threads,
                 completed=completed,
@@ -42,18 +49,69 @@ def train(
                 validations=[result.numbers for result in run.history],
             )
         run.logger.close()
-    assert run.best is not None  # whoever learns finishes with a validation
+    if run.best is None:
+        raise ValueError(f"{settings.algorithm} has learned nothing: its method learn must call run.finish at the end")
     return run.best
 
 
-def _learning(settings: LearnedSettings) -> Callable[[Run, Any], None]:
-    """Who learns with such settings."""
-    if isinstance(settings, SHACSettings):
-        from caster_gym.agents.learning.shac import learn_through_simulator
+class Job(NamedTuple):
+    """One training run."""
 
-        return learn_through_simulator
-    if isinstance(settings, RslPPOSettings):
-        from caster_gym.agents.learning.rsl_rl import learn_with_rsl_rl
+    name: str
+    task: TaskSettings
+    agent: LearnerSettings
+    seed: int
+    folder: Path
 
-        return learn_with_rsl_rl
-    return learn_with_sb3
+
+def train_all(jobs: Sequence[Job], threads: int = DEFAULT) -> None:
+    """Train all jobs, as many at a time as there are cores for their threads, with one progress bar over all steps.
+
+    Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised.
+    """
+    if not jobs:
+        return
+    workers = max(1, min(len(jobs), usable_cores() // threads))
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as manager, _bar(jobs) as show:
+        reports = manager.Queue()
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            futures = [pool.submit(_train_job, i, job, threads, reports) for i, job in enumerate(jobs)]
+            try:
+                while not all(future.done() for future in futures):
+                    _raise_errors(futures)
+                    try:
+                        show(*reports.get(timeout=0.5))
+                    except queue.Empty:
+                        continue
+                _raise_errors(futures)
+            except BaseException:
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+
+
+def _raise_errors(futures: Sequence["Future[None]"]) -> None:
+    for future in futures:
+        if future.done():
+            future.result()
+
+
+@contextmanager
+def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
+    done = [0] * len(jobs)
+    with tqdm(total=sum(job.agent.steps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
+
+        def show(job: int, steps: int, verdict: str) -> None:
+            done[job] = min(steps, jobs[job].agent.steps)
+            bar.n = sum(done)
+            if verdict:
+                bar.set_postfix_str(f"{jobs[job].name}: {verdict}", refresh=False)
+            bar.refresh()
+
+        yield show
+
+
+def _train_job(index: int, job: Job, threads: int, reports: Any) -> None:
+    train(
+        job.task, job.agent, job.seed, job.folder, lambda steps, verdict: reports.put((index, steps, verdict)), threads
+    )

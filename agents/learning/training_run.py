@@ -3,43 +3,21 @@
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from stable_baselines3.common.logger import KVWriter, configure
 
-from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out, test_batch
-from caster_gym.agents.comparison.metrics import Verdict, in_words, yardstick
-from caster_gym.agents.control.protocol import Agent
+from caster_gym.agents.comparison.evaluation import test_batch
+from caster_gym.agents.comparison.metrics import in_words
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.comparison.validation import Validation, verdict_on, write_history
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.agent_settings import LearnedSettings
 from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bundle
-from caster_gym.agents.settings import TaskSettings
+from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.report.provenance import versions
-from caster_gym.report.tables import write_csv
 
-VALIDATION_SEED = 500
 STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
 Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
-
-
-class Validation(NamedTuple):
-    """How good a policy is on validation paths."""
-
-    steps: int
-    seconds: float  # of training so far, validations left out
-    verdict: Verdict
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """All numbers by name."""
-        return {"steps": self.steps, "seconds": self.seconds, **self.verdict._asdict()}
-
-
-def verdict_on(agent: Agent, validation: Batch) -> Verdict:
-    """How good an agent is on a batch of validation paths, always from the same starts."""
-    how = yardstick(bare(validation).task)
-    verdict: Verdict = how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
-    return verdict
 
 
 class Run:
@@ -48,7 +26,7 @@ class Run:
     steps: done so far. logger: what SB3 records by; it writes progress.csv and TensorBoard events.
     """
 
-    def __init__(self, folder: Path, task: TaskSettings, settings: LearnedSettings, seed: int, report: Report) -> None:
+    def __init__(self, folder: Path, task: TaskSettings, settings: LearnerSettings, seed: int, report: Report) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder, self.task, self.settings, self.seed, self.report = folder, task, settings, seed, report
         self.logger = configure(str(folder), ["csv", "tensorboard"])
@@ -78,10 +56,9 @@ class Run:
     def diverged(self, steps: int, cause: BaseException | None = None) -> NoReturn:
         """End the run, whose policy is no longer one; what was validated before is kept."""
         self._diverged = True
-        rate = self.settings.learning_rate
-        raise ValueError(
-            f"training has diverged after {steps} steps, with a learning_rate of {rate:g}; try a smaller one"
-        ) from cause
+        rate = getattr(self.settings, "learning_rate", None)
+        advice = "" if rate is None else f", with a learning_rate of {rate:g}; try a smaller one"
+        raise ValueError(f"training has diverged after {steps} steps{advice}") from cause
 
     def validate(self, actor: Actor) -> None:
         """Try a policy on the validation paths, keep it, and keep it as the best one if it is."""
@@ -98,7 +75,7 @@ class Run:
         if self.best is None or result.verdict.merit > self.best.verdict.merit:
             self.best = result
             save_bundle(self.folder / "best", bundle)
-        self._write_history()
+        write_history(self.folder / "validation.csv", self.history)
         self._validating += time.perf_counter() - begun
 
     def record(self, steps: int, numbers: Mapping[str, float]) -> None:
@@ -115,9 +92,9 @@ class Run:
     def _describe(self, actor: Actor) -> PolicyDescription:
         return PolicyDescription(
             format=1,
-            name=self.settings.algorithm.upper(),
+            name=self.settings.name,
             squash=actor.squash,
-            hidden=self.settings.hidden,
+            hidden=actor.hidden,
             robot=self.task.described_robot,
             environment=self.task.environment,
             task=self.task.task,
@@ -126,7 +103,3 @@ class Run:
             trained_with={"settings": self.settings.model_dump(mode="json"), "seed": self.seed, "steps": self.steps},
             versions=versions(),
         )
-
-    def _write_history(self) -> None:
-        rows = (result.numbers.values() for result in self.history)
-        write_csv(self.folder / "validation.csv", self.history[0].numbers, rows)

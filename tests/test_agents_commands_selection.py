@@ -1,11 +1,11 @@
-"""caster_gym.agents.learning.trained_task: a policy is tried on what it was trained on, or one is told what else."""
+"""agents.commands.selection: a policy is tried on what it was trained on, or one is told what else."""
 
 import pytest
 import yaml
 
+from caster_gym.agents.commands.selection import choose_task
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION
-from caster_gym.agents.learning.trained_task import choose_task
-from caster_gym.agents.settings import TaskSettings
 from caster_gym.shipped_files import names_of, read_settings
 
 

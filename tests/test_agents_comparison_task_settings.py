@@ -1,4 +1,4 @@
-"""caster_gym.agents.settings: YAML is checked, what is tested on is never trained on, and errors say what would do."""
+"""agents.comparison.task_settings: YAML is checked, paths tested on are never trained on, errors say what would do."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -8,15 +8,7 @@ import yaml
 from gymnasium.vector import AutoresetMode
 
 from caster_gym.agents.comparison.evaluation import bare, make_batch
-from caster_gym.agents.learning.agent_settings import (
-    AgentSettings,
-    ComputedTorqueSettings,
-    LearnedSettings,
-    PPOSettings,
-    SACSettings,
-    read_agent,
-)
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.track_task import TrackTask
@@ -41,75 +33,11 @@ def written(tmp_path, content):
     return str(file)
 
 
-@pytest.mark.parametrize("name", names("agents"))
-def test_each_agent_that_comes_with_the_package_loads(name):
-    assert isinstance(read_agent(name), AgentSettings)
-
-
 @pytest.mark.parametrize("name", names("tasks"))
 def test_each_task_that_comes_with_the_package_loads(name):
     task = read_settings(TaskSettings, "tasks", name)
     for paths in (task.train, task.validation, task.test):
         assert bare(make_batch(task, paths, 1, AutoresetMode.NEXT_STEP)).engine.plan.names
-
-
-@pytest.mark.parametrize("name", names("benchmarks"))
-def test_each_benchmark_that_comes_with_the_package_names_what_there_is(name):
-    settings = read_settings(BenchmarkSettings, "benchmarks", name)
-    read_settings(TaskSettings, "tasks", settings.task)
-    learned = [isinstance(read_agent(agent), LearnedSettings) for agent in settings.agents]
-    assert any(learned)
-    assert not all(learned)
-    assert len(set(settings.seeds)) == len(settings.seeds) >= 3
-
-
-def test_the_kinds_of_agents_are_told_by_their_algorithm():
-    kinds = [type(read_agent(name)) for name in ("ppo", "sac", "computed_torque", "computed_torque_without_d1")]
-    assert kinds == [PPOSettings, SACSettings, ComputedTorqueSettings, ComputedTorqueSettings]
-    assert read_agent("computed_torque_without_wheels").known == "without wheels"
-
-
-@pytest.mark.parametrize("number", ["1e-3", "1E-3", "0.001", ".001"])
-def test_exponents_are_numbers(tmp_path, number):
-    settings = read_agent(written(tmp_path, f"algorithm: ppo\nlearning_rate: {number}\nsteps: 1e6\n"))
-    assert (settings.learning_rate, settings.steps) == (1e-3, 1_000_000)
-    assert isinstance(settings.steps, int)
-
-
-def test_changes_replace_what_the_file_says(tmp_path):
-    name = written(tmp_path, {"algorithm": "ppo", "steps": 5000, "robots": 8, "batch": 64})
-    changed = read_agent(name, {"steps": 700})
-    assert (changed.steps, changed.robots, changed.batch) == (700, 8, 64)
-    with pytest.raises(ConfigurationError, match=r"unknown key .*stepz.*; did you mean 'steps'\?"):
-        read_agent(name, {"stepz": 700})
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"algorithm": "ppo", "learning_rat": 1e-3}, r"unknown key .*learning_rat'; did you mean 'learning_rate'\?"),
-        ({"algorithm": "ppo", "buffer": 10}, "unknown key .*buffer"),  # a key of SAC
-        ({"algorithm": "computed torque", "known": "half"}, "known.*'half'"),
-        ({"algorithm": "pppo"}, r"unknown algorithm 'pppo'; did you mean 'ppo'\?"),
-        ({"steps": 10}, "algorithm"),
-        ({"algorithm": "ppo", "steps": 0}, "steps.* greater than 0, got 0"),
-        ({"algorithm": "ppo", "steps": "many"}, "steps.* should be a whole number, got 'many'"),
-        ({"algorithm": "ppo", "discount": 1.0}, "discount.* less than 1, got 1.0"),
-        ({"algorithm": "sac", "soft_update": 0.0}, "soft_update.* greater than 0"),
-        ({"algorithm": "ppo", "hidden": []}, "hidden.* at least 1 item"),
-        ({"algorithm": "ppo", "falling": 1}, "falling.* true or false, got 1"),
-        ({"algorithm": "computed torque", "natural_frequencies": [10.0, -1.0]}, "natural_frequencies.*-1.0"),
-    ],
-)
-def test_what_is_wrong_with_an_agent_is_named(tmp_path, content, message):
-    with pytest.raises(ConfigurationError, match=f"settings.yaml: .*{message}"):
-        read_agent(written(tmp_path, content))
-
-
-def test_a_batch_must_fit_into_what_is_collected():
-    PPOSettings(algorithm="ppo", robots=4, horizon=8, batch=32)
-    with pytest.raises(ConfigurationError, match="'batch' must be at most robots · horizon = 32 steps, got 33"):
-        parse(PPOSettings, {"algorithm": "ppo", "robots": 4, "horizon": 8, "batch": 33}, "ppo")
 
 
 @pytest.mark.parametrize(("kind", "other"), [("test", "train"), ("validation", "train"), ("test", "validation")])
@@ -203,38 +131,6 @@ def test_an_unknown_name_lists_the_known_ones(kind):
     known = ", ".join(names(kind))
     with pytest.raises(ConfigurationError, match=f"no 'nothing' in {kind}; known are {known}, or give the path"):
         find(kind, "nothing")
-
-
-def test_a_path_is_taken_as_it_is(tmp_path):
-    assert find("agents", str(tmp_path / "mine.yaml")) == tmp_path / "mine.yaml"
-    with pytest.raises(ConfigurationError, match=r"there is no file '.*mine\.yaml'"):
-        read_agent(str(tmp_path / "mine.yaml"))
-
-
-@pytest.mark.parametrize(
-    ("agent", "wrong", "advised"),
-    [
-        ("ppo", {"robots": 4}, {"robots": 4, "batch": 512}),
-        ("ppo", {"robots": 4}, {"robots": 16}),
-        ("ppo", {"robots": 4}, {"robots": 4, "horizon": 512}),
-        ("ppo_gpu", {"batch": 1000}, {"batch": 512}),
-        ("ppo_gpu", {"robots": 1, "horizon": 127, "batch": 2}, {"robots": 1, "horizon": 127, "batch": 127}),
-        ("ppo", {"robots": 1, "horizon": 1}, {"robots": 2048, "horizon": 1}),
-        ("shac", {"robots": 8}, {"robots": 8, "critic_batch": 128}),
-        ("shac", {"robots": 8}, {"robots": 8, "window": 32}),
-        ("sac", {"steps": 5000}, {"steps": 5000, "first_random": 4999}),
-    ],
-)
-def test_advice_on_settings_that_do_not_fit_together_helps(agent, wrong, advised):
-    """What is advised stands in the message, and is accepted."""
-    with pytest.raises(ConfigurationError) as caught:
-        read_agent(agent, wrong)
-    words = {"robots": "more robots", "horizon": "longer horizon", "window": "longer window", "steps": "steps in all"}
-    for key, value in advised.items():
-        if wrong.get(key) != value:
-            assert words.get(key, key) in str(caught.value)
-            assert key in words or key == "first_random" or str(value) in str(caught.value)
-    read_agent(agent, advised)
 
 
 def test_advice_on_held_out_paths_helps():

@@ -1,4 +1,4 @@
-"""Typed settings of tasks and comparisons; the YAML files in configs/ hold what differs from the defaults."""
+"""Typed settings of tasks; the YAML files in configs/tasks hold what differs from the defaults."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,8 +6,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import (
     Field,
-    PositiveFloat,
-    PositiveInt,
     ValidationError,
     ValidationInfo,
     field_validator,
@@ -15,7 +13,6 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
-from caster_gym.agents import usual_names as usual
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import Frozen
 from caster_gym.envs.follow_task import FollowTask
@@ -39,6 +36,32 @@ RewardSpecification: TypeAlias = Annotated[
 
 SHOWN = 4  # of the items of a list in a message
 TASKS: dict[str, type[TrackTask | FollowTask]] = {"track": TrackTask, "follow": FollowTask}
+
+
+def _usual_names(parameters: set[str]) -> dict[str, str]:
+    """Answers to keys beside `task` that belong into it, or that stand elsewhere; parameters: those of all tasks."""
+    inside = {name: f"write it inside of 'task', as task: {{{name}: …}}" for name in parameters}
+    usual = {
+        name: f"write it inside of 'task', as task: {{{here}: …}}"
+        for name, here in Task.usual_names.items()
+        if here in parameters
+    }
+    return {
+        **inside,
+        **usual,
+        "env": "environment",
+        "env_id": "environment",
+        "path": "the paths are those of 'train', 'validation' and 'test'",
+        "paths": "the paths are those of 'train', 'validation' and 'test'",
+        "max_episode_steps": Task.usual_names["max_episode_steps"],
+        "seed": "random paths have a 'seed' of their own, and training runs are given one by --seed",
+        "n_envs": "the number of robots is set by 'robots' of an agent",
+        "num_envs": "the number of robots is set by 'robots' of an agent",
+        "obstacles": "obstacles stand in 'arena'",
+        "rewards": "shaping",
+        "eval": "validation",
+        "evaluation": "test",
+    }
 
 
 class ChosenTask(Frozen):
@@ -73,7 +96,7 @@ class ChosenTask(Frozen):
 class TaskSettings(ChosenTask):
     """A robot, its task, and the paths to train, to choose and to test on."""
 
-    usual_names: ClassVar[Mapping[str, str]] = usual.of_task_files(
+    usual_names: ClassVar[Mapping[str, str]] = _usual_names(
         {name for kind in TASKS.values() for name in kind.model_fields}
     )
 
@@ -151,23 +174,3 @@ def _remedy(path: PathSpecification) -> str:
 def _first_of(path: PathSpecification) -> PathSpecification:
     """Random paths of one seed begin alike, however many they are: the first stands for all of them."""
     return path.model_copy(update={"count": 1}) if isinstance(path, RandomPaths) else path
-
-
-class BenchmarkSettings(Frozen):
-    """Which agents are compared, and how."""
-
-    usual_names: ClassVar[Mapping[str, str]] = usual.of_comparison_files(TaskSettings.model_fields.keys() - {"task"})
-    task: NameOrFile = "track"  # name of a file in configs/tasks, or path of one
-    agents: Annotated[tuple[NameOrFile, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
-    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
-    starts: PositiveInt = 1  # episodes on each test path, with different starts
-    start_seed: Seed = 1000  # the same starts for every agent
-    settling: PositiveFloat | None = None  # [s] what comes before counts as transient; None: as suits the task
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-
-    @field_validator("seeds")
-    @classmethod
-    def _seeds_differ(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        if len(set(seeds)) < len(seeds):
-            raise ValueError(f"must differ from one another, got {list(seeds)}")
-        return seeds

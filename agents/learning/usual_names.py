@@ -3,8 +3,6 @@
 Each name stands for a field, whose value means the same, or for words that say where such a thing is set.
 """
 
-from caster_gym.envs.task import Task
-
 _EVERY_LEARNER = {
     "total_timesteps": "steps",
     "n_steps_total": "steps",
@@ -116,53 +114,10 @@ SHAC = {
     "clip_range": "SHAC does not clip its updates; 'greatest_gradient' limits them",
     "vf_coef": "the critic has a loss and a 'critic_learning_rate' of its own",
 }
-COMPUTED_TORQUE = {
-    "natural_frequency": "it is chosen among the 'natural_frequencies' listed, e.g. natural_frequencies: [10.0]",
-    "bandwidth": "it is chosen among the 'natural_frequencies' listed, e.g. natural_frequencies: [10.0]",
-    "kp": "gains follow from the natural frequency: list it as natural_frequencies: [10.0]",
-    "kd": "gains follow from the natural frequency: list it as natural_frequencies: [10.0]",
+OF_LEARNERS = {  # keys of learners, where they are not to be set
+    name: f"it belongs to the agents: write {here} into their files, or give --set {here}=…"
+    for name, here in {
+        **{name: here for name, here in _EVERY_LEARNER.items() if here.isidentifier()},
+        **{here: here for names in (PPO, SAC, SHAC) for here in names.values() if here.isidentifier()},
+    }.items()
 }
-
-
-def of_task_files(parameters: set[str]) -> dict[str, str]:
-    """Answers to keys beside `task` that belong into it, or that stand elsewhere; parameters: those of all tasks."""
-    inside = {name: f"write it inside of 'task', as task: {{{name}: …}}" for name in parameters}
-    usual = {
-        name: f"write it inside of 'task', as task: {{{here}: …}}"
-        for name, here in Task.usual_names.items()
-        if here in parameters
-    }
-    return {
-        **inside,
-        **usual,
-        "env": "environment",
-        "env_id": "environment",
-        "path": "the paths are those of 'train', 'validation' and 'test'",
-        "paths": "the paths are those of 'train', 'validation' and 'test'",
-        "max_episode_steps": Task.usual_names["max_episode_steps"],
-        "seed": "random paths have a 'seed' of their own, and training runs are given one by --seed",
-        "n_envs": "the number of robots is set by 'robots' of an agent",
-        "num_envs": "the number of robots is set by 'robots' of an agent",
-        "obstacles": "obstacles stand in 'arena'",
-        "rewards": "shaping",
-        "eval": "validation",
-        "evaluation": "test",
-    }
-
-
-def of_comparison_files(parameters: set[str]) -> dict[str, str]:
-    """Answers to keys of comparisons that belong to its agents or to its task; parameters: keys of tasks."""
-    usual = {name: here for name, here in _EVERY_LEARNER.items() if here.isidentifier()}
-    fields = {here: here for names in (PPO, SAC, SHAC) for here in names.values() if here.isidentifier()}
-    return {
-        **{
-            name: f"it belongs to the agents: write {here} into their files, or give --set {here}=…"
-            for name, here in {**usual, **fields}.items()
-        },
-        **dict.fromkeys(parameters, "it is a key of a task, whose name or file is given as 'task'"),
-        "seed": "seeds",
-        "n_seeds": "'seeds' lists them: [0, 1, 2]",
-        "agent": "agents",
-        "threads": "the number of threads is given by --threads",
-        "n_eval_episodes": "starts",
-    }

@@ -8,9 +8,10 @@ import stable_baselines3
 import yaml
 from typer.main import get_command
 
+from caster_gym.agents.commands.benchmark import BenchmarkSettings
 from caster_gym.agents.commands.cli import app
-from caster_gym.agents.learning.agent_settings import read_agent
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.registry import read_agent
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.caster_track import CasterTrackEnv

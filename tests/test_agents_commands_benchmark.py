@@ -9,27 +9,22 @@ import pytest
 import yaml
 from numpy.testing import assert_array_equal
 
-from caster_gym.agents.comparison import benchmark
-from caster_gym.agents.comparison.benchmark import (
-    Contender,
-    Job,
-    compare,
-    read_comparison,
-    read_history,
-    run_benchmark,
-    train_all,
-    tune,
-)
+from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.comparison.follow_metrics import FollowMetrics, FollowVerdict
+from caster_gym.agents.comparison.results import Contender, compare
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.track_metrics import TrackMetrics, TrackVerdict, measure
-from caster_gym.agents.control.computed_torque import ComputedTorque
-from caster_gym.agents.learning.agent_settings import ComputedTorqueSettings, read_agent
+from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history, tune
+from caster_gym.agents.control.computed_torque import ComputedTorque, ComputedTorqueSettings
+from caster_gym.agents.control.protocol import ControllerSettings
+from caster_gym.agents.learning import training
 from caster_gym.agents.learning.bundle import load_policy
-from caster_gym.agents.learning.training_run import VALIDATION_SEED
-from caster_gym.agents.settings import BenchmarkSettings, TaskSettings
+from caster_gym.agents.learning.settings import LearnerSettings
+from caster_gym.agents.learning.training import Job, train_all
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError
-from caster_gym.shipped_files import read_settings
+from caster_gym.shipped_files import names_of, read_settings
 
 test_batch.__test__ = False  # a name that pytest would take for a test
 
@@ -107,7 +102,7 @@ def test_run_yaml_holds_what_the_comparison_was(finished, settings):
     assert {"versions", "command", "task", "robot"} <= set(facts)
     controller, learner = (Path(agent).stem for agent in settings.agents)
     assert facts["agents"][learner]["steps"] == 512  # the change, not the file's
-    assert facts["natural_frequencies"] == {controller: 15.0}
+    assert facts["tuned"][controller]["natural_frequencies"] == [15.0]
 
 
 def test_every_seed_is_trained_for_itself(finished):
@@ -117,7 +112,7 @@ def test_every_seed_is_trained_for_itself(finished):
     seeds = [load_policy(policy / "best").description.trained_with["seed"] for policy in policies]
     assert sorted(seeds) == SEEDS
     for policy in policies:
-        history = read_history(policy, TrackVerdict)
+        history = read_history(policy / "validation.csv", TrackVerdict)
         assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
         assert history[-1].steps == 512
 
@@ -152,7 +147,7 @@ def test_all_agents_get_the_same_starts_and_paths(settings, task):
         Recorder(ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period), f"{frequency}")
         for frequency in (5.0, 10.0)
     ]
-    results, shown = compare([Contender(agent.name, agent, None) for agent in agents], batch, settings)
+    results, shown = compare([Contender(agent.name, agent, None) for agent in agents], batch, settings.start_seed)
     assert_array_equal(agents[0].first, agents[1].first)
     assert results[0].paths == results[1].paths == ("random_paths 0", "random_paths 1", "random_paths 2") * STARTS
     first, second = shown.values()
@@ -170,8 +165,9 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
         metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
         errors[frequency] = metrics.position_rmse.mean()
     settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
-    agent, frequency = tune(settings, batch)
-    assert frequency == min(errors, key=errors.get)
+    agent, best = tune(settings, batch)
+    frequency = min(errors, key=errors.get)
+    assert best == settings.model_copy(update={"natural_frequencies": (frequency,)})
     assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
 
 
@@ -193,9 +189,9 @@ def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, 
             pools.append(workers)
             super().__init__(1)
 
-    monkeypatch.setattr(benchmark, "ProcessPoolExecutor", Pool)
-    monkeypatch.setattr(benchmark, "usable_cores", lambda: 16)
-    monkeypatch.setattr(benchmark, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
+    monkeypatch.setattr(training, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(training, "usable_cores", lambda: 16)
+    monkeypatch.setattr(training, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
     agent = read_agent(settings.agents[1], {"steps": 512})
     train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
     assert pools == [processes]
@@ -246,7 +242,7 @@ def test_following_is_compared_in_the_same_way(tmp_path):
     assert (controlled["finished"], controlled["failed"]) == ("1.0", "0.0")
     assert learned["seed"] == "2"
     policy = folder / "policies" / "ppo-2"
-    history = read_history(policy, FollowVerdict)
+    history = read_history(policy / "validation.csv", FollowVerdict)
     assert [str(one.steps) for one in history] == [row["steps"] for row in rows(policy / "validation.csv")]
     best = load_policy(policy / "best").description
     assert (best.environment, best.wrappers, best.actions) == ("follow", (), 6)
@@ -257,3 +253,13 @@ def test_computed_torque_is_refused_where_actions_are_no_torques(task):
     settings = ComputedTorqueSettings(algorithm="computed torque")
     with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
         tune(settings, test_batch(commanded, commanded.validation, starts=1))
+
+
+@pytest.mark.parametrize("name", names_of("benchmarks"))
+def test_each_benchmark_that_comes_with_the_package_names_what_there_is(name):
+    settings = read_settings(BenchmarkSettings, "benchmarks", name)
+    read_settings(TaskSettings, "tasks", settings.task)
+    agents = [read_agent(agent) for agent in settings.agents]
+    for kind in (ControllerSettings, LearnerSettings):
+        assert any(isinstance(agent, kind) for agent in agents)
+    assert len(set(settings.seeds)) == len(settings.seeds) >= 3

@@ -1,32 +1,48 @@
-"""Typed settings of agents; the YAML files in configs/agents hold what differs from the defaults."""
+"""Typed settings of learners; the YAML files in configs/agents hold what differs from the defaults."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from caster_gym.agents import usual_names as usual
-from caster_gym.agents.control.computed_torque import KnownModel
-from caster_gym.configuration import ConfigurationError, Frozen, parse, read_yaml
-from caster_gym.paths.naming import unknown_name
-from caster_gym.shipped_files import find
+from caster_gym.agents.control.protocol import AgentSettings
+from caster_gym.agents.learning import usual_names as usual
+from caster_gym.configuration import Frozen
+
+if TYPE_CHECKING:
+    from caster_gym.agents.learning.training_run import Run
 
 Units: TypeAlias = Annotated[int, Field(gt=0, le=16_384)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
-class Learner(Frozen):
-    """What PPO and SAC have in common."""
+class LearnerSettings(AgentSettings):
+    """Settings of a learner, whose policy is a network of dense layers, `caster_gym.agents.learning.actor.Actor`."""
+
+    steps: PositiveInt  # control periods of all robots together
+    validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
+
+    @property
+    def name(self) -> str:
+        """What tables and figures call its policies."""
+        return self.algorithm.upper() if self.algorithm.isidentifier() else self.algorithm.partition(":")[2]
+
+    @abstractmethod
+    def learn(self, run: "Run") -> None:
+        """Train for `steps`, with calls of `run.advance` in between, and of `run.finish` at the end in any case."""
+
+
+class GradientLearner(LearnerSettings):
+    """What our learners have in common."""
 
     hidden: Annotated[tuple[Units, ...], Field(min_length=1)] = (128, 128)  # units of each layer, ReLU
     discount: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.97  # per control period
     learning_rate: PositiveFloat
     falling: bool = True  # learning rate falls linearly to zero
-    validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
 
 
-class OnPolicy(Learner):
+class OnPolicy(GradientLearner):
     """Proximal policy optimisation (Schulman et al., 2017), whoever computes it."""
 
     steps: PositiveInt = 2_000_000  # control periods of all robots together
@@ -57,6 +73,12 @@ class PPOSettings(OnPolicy):
     usual_names: ClassVar[Mapping[str, str]] = usual.PPO
     algorithm: Literal["ppo"]
 
+    def learn(self, run: "Run") -> None:
+        """Train by Stable-Baselines3."""
+        from caster_gym.agents.learning.sb3_learning import learn_with_sb3
+
+        learn_with_sb3(run, self)
+
 
 class OnTensors(Frozen):
     """Where robots and learner live together, when observations and rewards stay Torch tensors."""
@@ -83,8 +105,14 @@ class RslPPOSettings(OnPolicy, OnTensors):
             )
         return self
 
+    def learn(self, run: "Run") -> None:
+        """Train by rsl-rl-lib."""
+        from caster_gym.agents.learning.rsl_rl import learn_with_rsl_rl
 
-class SHACSettings(Learner, OnTensors):
+        learn_with_rsl_rl(run, self)
+
+
+class SHACSettings(GradientLearner, OnTensors):
     """Short-horizon actor-critic (Xu et al., 2022): the policy's gradient passes through the simulator itself."""
 
     usual_names: ClassVar[Mapping[str, str]] = usual.SHAC
@@ -113,8 +141,14 @@ class SHACSettings(Learner, OnTensors):
             )
         return self
 
+    def learn(self, run: "Run") -> None:
+        """Train through the simulator."""
+        from caster_gym.agents.learning.shac import learn_through_simulator
 
-class SACSettings(Learner):
+        learn_through_simulator(run, self)
+
+
+class SACSettings(GradientLearner):
     """Soft actor-critic (Haarnoja et al., 2018), by Stable-Baselines3."""
 
     usual_names: ClassVar[Mapping[str, str]] = usual.SAC
@@ -141,32 +175,8 @@ class SACSettings(Learner):
             )
         return self
 
+    def learn(self, run: "Run") -> None:
+        """Train by Stable-Baselines3."""
+        from caster_gym.agents.learning.sb3_learning import learn_with_sb3
 
-class ComputedTorqueSettings(Frozen):
-    """Model-based control; its natural frequency is the one of those listed that does best on validation paths."""
-
-    usual_names: ClassVar[Mapping[str, str]] = usual.COMPUTED_TORQUE
-    algorithm: Literal["computed torque"]
-    known: KnownModel = "exact"
-    natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
-
-
-LearnedSettings: TypeAlias = PPOSettings | SACSettings | RslPPOSettings | SHACSettings
-AgentSettings: TypeAlias = LearnedSettings | ComputedTorqueSettings
-
-
-def read_agent(name: str | Path, changes: Mapping[str, Any] | None = None) -> AgentSettings:
-    """Checked settings of an agent, with some fields changed."""
-    path = find("agents", name)
-    content = {**read_yaml(path), **(changes or {})}
-    kinds: dict[str, type[AgentSettings]] = {
-        "ppo": PPOSettings,
-        "sac": SACSettings,
-        "rsl_ppo": RslPPOSettings,
-        "shac": SHACSettings,
-        "computed torque": ComputedTorqueSettings,
-    }
-    algorithm = content.get("algorithm")
-    if algorithm not in kinds:
-        raise ConfigurationError(f"{path}: {unknown_name('algorithm', algorithm, kinds)}")
-    return parse(kinds[algorithm], content, f"{path}, as changed" if changes else str(path), path.parent)
+        learn_with_sb3(run, self)

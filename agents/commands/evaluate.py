@@ -1,0 +1,35 @@
+"""The command `evaluate`: one agent on the test paths of a task."""
+
+from pathlib import Path
+
+from caster_gym.agents.commands.benchmark import BenchmarkSettings
+from caster_gym.agents.commands.command_line import files_among
+from caster_gym.agents.commands.selection import choose_agent, choose_task
+from caster_gym.agents.comparison.evaluation import test_batch
+from caster_gym.agents.comparison.results import Contender, compare, write_results
+from caster_gym.engines.tensor.threads import limited_to
+from caster_gym.report.provenance import write_provenance
+from caster_gym.report.run_folder import check_free, staged
+
+
+def evaluate(policy: str, task: str | None, starts: int, out: Path, overwrite: bool, threads: int) -> str:
+    """Write table, episodes and figures of an agent into the folder `out`; returns the table."""
+    settings, words = choose_task(policy, task)
+    how = BenchmarkSettings(agents=(policy,), starts=starts)
+    for read in files_among(task, settings.robot):
+        check_free(out, overwrite, kept=read)
+    with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
+        test = test_batch(settings, settings.test, starts)
+        agent, tuned = choose_agent(policy, settings, test)
+        compared = compare([Contender(agent.name, agent, None)], test, how.start_seed)
+        text = write_results(folder, compared, test, how.confidence, {}, words)
+        model_based = {} if tuned is None else {"agent": tuned.model_dump(mode="json"), "source": tuned.source}
+        write_provenance(
+            folder,
+            policy=policy,
+            **model_based,
+            task=settings.model_dump(mode="json"),
+            starts=starts,
+            threads=threads,
+        )
+    return text

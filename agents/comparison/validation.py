@@ -1,0 +1,72 @@
+"""How good agents are on validation paths, on which policies and gains are chosen."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
+from caster_gym.agents.comparison.follow_metrics import FollowVerdict
+from caster_gym.agents.comparison.metrics import Verdict, yardstick
+from caster_gym.agents.comparison.task_settings import in_brief
+from caster_gym.agents.comparison.track_metrics import TrackVerdict
+from caster_gym.agents.control.protocol import Agent, ControllerSettings
+from caster_gym.report.tables import write_csv
+
+VALIDATION_SEED = 500
+
+
+class Validation(NamedTuple):
+    """How good a policy is on validation paths."""
+
+    steps: int
+    seconds: float  # of training so far, validations left out
+    verdict: Verdict
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """All numbers by name."""
+        return {"steps": self.steps, "seconds": self.seconds, **self.verdict._asdict()}
+
+
+class Tuned(NamedTuple):
+    """A controller, and the settings that did best on validation paths."""
+
+    controller: Agent
+    settings: ControllerSettings
+
+
+def verdict_on(agent: Agent, validation: Batch) -> Verdict:
+    """How good an agent is on a batch of validation paths, always from the same starts."""
+    how = yardstick(bare(validation).task)
+    verdict: Verdict = how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
+    return verdict
+
+
+def tune(settings: ControllerSettings, validation: Batch) -> Tuned:
+    """The controller whose settings, of the candidates, do best on validation paths, as policies are chosen there."""
+    plain = bare(validation)
+    if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
+        raise ValueError(
+            f"{settings.algorithm} gives torques, but the task's actions are those of {in_brief(redefining[0])}: leave "
+            "that out of its wrappers"
+        )
+    layout, period = plain.engine.layout, plain.task.control_period
+    tried = [Tuned(one.controller(layout, period), one) for one in settings.candidates()]
+    return max(tried, key=lambda one: verdict_on(one.controller, validation).merit) if len(tried) > 1 else tried[0]
+
+
+def write_history(path: Path, history: Sequence[Validation]) -> None:
+    """The validations of a training run as CSV."""
+    write_csv(path, history[0].numbers, (result.numbers.values() for result in history))
+
+
+def read_history(path: Path, verdict: type[TrackVerdict] | type[FollowVerdict]) -> list[Validation]:
+    """The validations of a training run on a task with these verdicts."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Validation(
+                int(row["steps"]), float(row["seconds"]), verdict._make(float(row[name]) for name in verdict._fields)
+            )
+            for row in csv.DictReader(file)
+        ]
