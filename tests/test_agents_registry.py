@@ -1,12 +1,16 @@
 """agents.registry: agents by their names, those of others by module and class, and errors that say what is wrong."""
 
+import hashlib
+import sys
+
 import pytest
 import yaml
 
+import caster_gym
 from caster_gym.agents.control.computed_torque import ComputedTorqueSettings
-from caster_gym.agents.control.protocol import AgentSettings
+from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import PPOSettings, SACSettings
-from caster_gym.agents.registry import read_agent
+from caster_gym.agents.registry import RESULTS, read_agent
 from caster_gym.configuration import ConfigurationError
 from caster_gym.shipped_files import find, names_of
 
@@ -69,3 +73,96 @@ def test_a_path_is_taken_as_it_is(tmp_path):
     assert find("agents", str(tmp_path / "mine.yaml")) == tmp_path / "mine.yaml"
     with pytest.raises(ConfigurationError, match=r"there is no file '.*mine\.yaml'"):
         read_agent(str(tmp_path / "mine.yaml"))
+
+
+OWN = """
+from caster_gym.agents.control.protocol import ControllerSettings
+from caster_gym.agents.learning.settings import LearnerSettings
+
+LIMIT = 3.0
+
+class Still:
+    name = "still"
+
+class Resting(ControllerSettings):
+    gain: float = 1.0
+    def controller(self, layout, period):
+        return Still()
+
+class Unfinished(LearnerSettings):
+    n_timesteps: int = 10
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """Reads an agent file whose algorithm is a class of a module beside it; the module's name is new in each test."""
+    monkeypatch.syspath_prepend(tmp_path / "elsewhere")  # restores sys.path afterwards
+    module = f"own_{tmp_path.name}"
+    (tmp_path / f"{module}.py").write_text(OWN, encoding="utf-8")
+    (tmp_path / f"broken_{module}.py").write_text("1 / 0", encoding="utf-8")
+    (tmp_path / f"needy_{module}.py").write_text("import no_such_library", encoding="utf-8")
+
+    def read(algorithm, **settings):
+        return read_agent(written(tmp_path, {"algorithm": algorithm.replace("OWN", module), **settings}))
+
+    yield read
+    for name in [name for name in sys.modules if name.endswith(module)]:
+        del sys.modules[name]
+
+
+def test_an_agent_of_ones_own_is_read_from_the_module_beside_its_file(own):
+    settings = own("OWN:Resting", gain=2)
+    assert isinstance(settings, ControllerSettings)
+    assert (type(settings).__name__, settings.model_dump()["gain"]) == ("Resting", 2.0)
+    assert settings.controller(None, 0.02).name == "still"
+    assert list(settings.candidates()) == [settings]
+
+
+def test_the_source_of_an_agent_is_its_module_and_version(own, tmp_path):
+    found = own("OWN:Resting").source
+    (file,) = tmp_path.glob("own_*.py")
+    assert found == {"module": file.stem, "version": f"sha256:{hashlib.sha256(OWN.encode()).hexdigest()}"}
+    assert read_agent("ppo").source == {
+        "module": "caster_gym.agents.learning.settings",
+        "version": caster_gym.__version__,
+    }
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "message"),
+    [
+        (
+            "nowhere:Resting",
+            "no module 'nowhere' in .*, in the working folder or among the installed packages",
+        ),
+        ("OWN:Restin", r"has no 'Restin'; did you mean 'Resting'\?"),
+        ("json:Resting", "module 'json' has no 'Resting'; no class in it has settings of an agent"),
+        ("OWN:LIMIT", "LIMIT must be a class derived from ControllerSettings or LearnerSettings, got 3.0"),
+        ("OWN:Still", "Still must be a class derived from ControllerSettings or LearnerSettings, got <class"),
+        ("OWN:ControllerSettings", "must be a class derived from ControllerSettings"),
+        ("OWN:Unfinished", "Unfinished must define the method learn"),
+        ("broken_OWN:Resting", "cannot be imported: ZeroDivisionError: division by zero"),
+        ("needy_OWN:Resting", "needs 'no_such_library', which is not installed"),
+        (":Resting", "is written as module:Name, got algorithm ':Resting'"),
+        ("OWN:", "is written as module:Name, got algorithm"),
+        ("../own:Resting", "is written as module:Name, got algorithm"),
+        ("Resting", "unknown algorithm 'Resting'; .*a class of your own is written as module:Name"),
+    ],
+)
+def test_what_is_wrong_with_an_agent_of_ones_own_is_said_in_a_sentence(own, algorithm, message):
+    with pytest.raises(ConfigurationError, match=f"settings.yaml: .*{message}"):
+        own(algorithm)
+
+
+def test_settings_of_ones_own_are_checked_like_all_others(own):
+    with pytest.raises(ConfigurationError, match=r"unknown key 'gian'; did you mean 'gain'\?"):
+        own("OWN:Resting", gian=1.0)
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_no_code_is_run_for_a_file_among_results(own, tmp_path, result):
+    (tmp_path / result).touch()
+    with pytest.raises(ConfigurationError, match="lies in a folder of results, from which no code is run"):
+        own("OWN:Resting")
+    assert not any(name.startswith("own_") for name in sys.modules)
