@@ -1,4 +1,4 @@
-"""agents.comparison.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
+"""agents.commands.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
 
 import csv
 from concurrent.futures import ThreadPoolExecutor
