@@ -12,7 +12,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from tqdm import tqdm
 
 from caster_gym.engines.native.cores import usable_cores
-from caster_gym.engines.tensor.threads import limited_to
+from caster_gym.engines.tensor.threads import limit_threads
 from caster_gym.report.pages import paragraph
 from caster_gym.report.tables import markdown_table
 from scripts.speed_timing import RATE, middle, shown
@@ -62,7 +62,7 @@ def train_beside(learner: BaseAlgorithm, periods: int, pairs: int = PAIRS) -> Be
     with busy_processes(processes), tqdm(total=pairs * len(COUNTS), desc="beside busy processes") as bar:
         for _ in range(pairs):
             for threads in rng.permutation(COUNTS).tolist():
-                with limited_to(threads):
+                with limit_threads(threads):
                     clock, processor = time.perf_counter(), time.process_time()
                     learner.learn(periods, reset_num_timesteps=False)
                     rounds.append(Round(threads, time.perf_counter() - clock, time.process_time() - processor))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from caster_gym.analysis.frames import motion_in_body, rate_in_body, turned
+from caster_gym.analysis.frames import motion_in_body, rate_in_body, turn_planar
 from caster_gym.paths.headings import Spinning
 from caster_gym.paths.shapes import Ellipse
 
@@ -13,10 +13,10 @@ def test_a_heading_turns_as_its_matrix_does_and_its_conjugate_back():
     beta, vector = rng.uniform(-np.pi, np.pi, 20), rng.normal(size=(20, 3))
     c, s, o, e = np.cos(beta), np.sin(beta), np.zeros(20), np.ones(20)
     matrix = np.moveaxis(np.array([[c, -s, o], [s, c, o], [o, o, e]]), -1, 0)
-    world = turned(vector, np.exp(1j * beta))
+    world = turn_planar(vector, np.exp(1j * beta))
     assert_allclose(world, np.einsum("kij,kj->ki", matrix, vector), atol=1e-14)  # rounding
-    assert_allclose(turned(world, np.exp(-1j * beta)), vector, atol=1e-14)
-    assert_allclose(turned(vector[0], np.exp(1j * beta[0])), world[0], atol=1e-15)
+    assert_allclose(turn_planar(world, np.exp(-1j * beta)), vector, atol=1e-14)
+    assert_allclose(turn_planar(vector[0], np.exp(1j * beta[0])), world[0], atol=1e-15)
 
 
 def test_uniform_circling_with_the_heading_along_the_way_has_no_rate_in_the_body():

@@ -12,13 +12,14 @@ from caster_gym.mechanics.floor_friction import (
     grip,
     impulse_limit,
     newton_round,
-    sliding,
+    slide_ratio,
     unheld_velocity,
     used_share,
 )
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import pairs
+from caster_gym.mechanics.slip_state import rolling_state
 from tests.random_robots import CASTER_COUNTS, random_robot
 
 ROUNDS = (1.0, 1.0, 1.0, 0.5, 0.5, 0.25, *(0.0,) * 10)  # more than enough
@@ -38,7 +39,7 @@ def draw(seed, wheels):
         rows = rng.normal(size=(2, 3))
         footings.append(Footing(tuple(free), tuple(map(tuple, rows)), (k[0, 0], k[0, 1], k[1, 1])))
         limits.append(impulse_limit(1.0, rng.choice((0.0, 0.05, 0.5, 5.0)) * rng.uniform(0.5, 1.5)))
-        slides.append(sliding(tuple(before), limits[-1]))
+        slides.append(slide_ratio(tuple(before), limits[-1]))
     upper = tuple(inertia[np.triu_indices(3)])
     problem = (upper, tuple(rng.normal(size=3)), tuple(footings), tuple(limits))
     return problem, tuple(slides)
@@ -156,7 +157,7 @@ def hard_problems(monkeypatch, h=5e-3):
         for friction in (0.05, 0.3, 0.7):
             angles = rng.uniform(-np.pi, np.pi, n)
             f = tuple((np.cos(angle), np.sin(angle)) for angle in angles)
-            state = slip.rolling_state(State((0.0, 0.0), (1.0, 0.0), tuple(rng.uniform(-1, 1, 3)), f), numbers)
+            state = rolling_state(State((0.0, 0.0), (1.0, 0.0), tuple(rng.uniform(-1, 1, 3)), f), numbers)
             push = friction * GRAVITY * numbers.platform.mass / n
             levers = np.array([(caster.radius, caster.trail) for caster in robot.casters]).ravel()
             for step in range(30):

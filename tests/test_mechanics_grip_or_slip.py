@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym.mechanics.floor import Surface
 from caster_gym.mechanics.free_casters import slip_energy
-from caster_gym.mechanics.grip_or_slip import careful_step, free_step, noted_step, power, response
+from caster_gym.mechanics.grip_or_slip import free_step, power, response, step_with_use, step_with_use_apart
 from caster_gym.mechanics.integration import State, rk4_step
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
@@ -41,7 +41,7 @@ def test_without_friction_the_motors_work_is_the_energy_gained(caster_count):
 def test_a_floor_that_grips_is_no_other_plant(caster_count):
     numbers, state, torques, wrench = moving(4, caster_count)
     expected = rk4_step(state, torques, wrench, 1e-3, numbers)
-    for step in (free_step, lambda *given: noted_step(*given)[0], lambda *given: careful_step(*given)[0]):
+    for step in (free_step, lambda *given: step_with_use(*given)[0], lambda *given: step_with_use_apart(*given)[0]):
         assert step(state, torques, wrench, 1e-3, numbers, None) == expected
 
 
@@ -63,7 +63,7 @@ def test_the_floor_gives_what_it_has_and_no_more():
     state = rolling_state(rolling, numbers)
     uses = []
     for friction in (0.01, 50.0):
-        _, asked = noted_step(state, torques, NOTHING, 1e-3, numbers, Surface((friction,) * 4, 0.01))
+        _, asked = step_with_use(state, torques, NOTHING, 1e-3, numbers, Surface((friction,) * 4, 0.01))
         uses.append(asked.traction)
     assert uses[0] == pytest.approx(1.0, abs=1e-12)
     assert uses[1] < 0.5

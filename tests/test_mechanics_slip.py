@@ -13,7 +13,7 @@ from caster_gym.mechanics.integration import State, pack_state, rk4_step
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import each, pairs, total
 from caster_gym.mechanics.slip import slip_step
-from caster_gym.mechanics.slip_state import rolling_state, turned, unpack_slip_state
+from caster_gym.mechanics.slip_state import rolling_state, turn_by, unpack_slip_state
 from caster_gym.mechanics.slip_tilt import free_tilt
 from tests.kane_free import FreeKane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
@@ -345,11 +345,11 @@ def test_directions_keep_their_length():
     """(S9): to rounding, however fast; and turn by the angle to second order."""
     f = (0.6, 0.8)
     for _ in range(1000):
-        f = turned(f, 0.7)
+        f = turn_by(f, 0.7)
     assert np.hypot(*f) == pytest.approx(1.0, abs=1e-13)
     errors = []
     for angle in (0.2, 0.1):
-        c, s = turned((1.0, 0.0), angle)
+        c, s = turn_by((1.0, 0.0), angle)
         errors.append(abs(np.arctan2(s, c) - angle))
     assert errors[0] / errors[1] == pytest.approx(8.0, rel=0.05)  # of third order in one step
 

@@ -40,7 +40,7 @@ def test_the_timed_course_is_a_motion(shape):
     So the mean of the difference tells: it falls with the time step, while a wrong column would leave it.
     """
     (course,) = build_courses(shape, ROBOT, 1.0)
-    timed = course.timed(0.002)
+    timed = course.trajectory(0.002)
     samples = timed.samples
     velocity = np.diff(samples[:, 0:2], axis=0) / 0.002
     assert_allclose(velocity, 0.5 * (samples[1:, 4:6] + samples[:-1, 4:6]), atol=2e-3)
@@ -52,7 +52,7 @@ def test_the_timed_course_is_a_motion(shape):
 
 def test_the_timed_course_starts_and_ends_as_the_course_does():
     (course,) = build_courses("ellipse", ROBOT, 1.0)
-    timed = course.timed(0.02)
+    timed = course.trajectory(0.02)
     assert 0.0 <= timed.duration - course.duration < 0.02
     assert_allclose(timed.samples[[0, -1]][:, [0, 1, 2, 3]], course.samples[[0, -1]][:, [0, 1, 5, 6]], atol=1e-12)
     assert_allclose(timed.samples[[0, -1], 4:7], 0.0, atol=0.0)
@@ -79,7 +79,7 @@ def test_a_course_does_not_depend_on_those_built_with_it():
 def test_a_free_heading_does_not_turn():
     (course,) = build_courses("lemniscate", ROBOT, 1.0, free_heading=True)
     assert_array_equal(np.ptp(course.samples[:, 5:9], axis=0), 0.0)
-    assert motor_use([course.timed(0.005)], ROBOT).use[0] < 0.85
+    assert motor_use([course.trajectory(0.005)], ROBOT).use[0] < 0.85
 
 
 def test_courses_of_one_name_are_told_apart():
@@ -175,4 +175,4 @@ def test_a_table_of_another_shape_and_one_with_holes_are_refused():
 def test_a_course_of_too_many_time_steps_is_refused():
     (course,) = build_courses("circle", ROBOT, 1.0)
     with pytest.raises(ValueError, match="over 1000000 steps of 1e-06 s"):
-        course.timed(1e-6)
+        course.trajectory(1e-6)

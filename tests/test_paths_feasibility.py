@@ -10,7 +10,7 @@ from caster_gym import Model, load_robot
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.paths import build_trajectories, read_paths
 from caster_gym.paths.feasibility import check_feasible, motor_use, motor_uses_at
-from caster_gym.paths.moments import sampled
+from caster_gym.paths.moments import sample_paths
 from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import COLUMNS, Trajectory
 from caster_gym.robot import Robot
@@ -134,7 +134,7 @@ def test_nothing_between_samples_is_harder_than_what_is_found(name):
     for path in PATHS.values():
         (coarse,), (fine,) = trajectories(path, 0.02), trajectories(path, 0.0002)
         found = motor_use((coarse,), robot).use[0]
-        block = next(sampled((fine,), robot))
+        block = next(sample_paths((fine,), robot))
         seen = motor_uses_at(block.motion, robot_parameters(robot)).max()
         assert seen <= 1.0005 * found, path  # closer samples of a random path scale it by 3e-4
         assert found <= 1.002 * seen, path
@@ -176,7 +176,7 @@ def test_plans_whose_accelerations_jump_are_judged_by_what_they_say():
     for name, column in (("x", x), ("cos", 1.0), ("vx", v), ("ax", a)):
         table[:, COLUMNS.index(name)] = column
     plan = Trajectory("plan", h, table)
-    at_samples = motor_uses_at(next(sampled((plan,), ROBOT)).motion, robot_parameters(ROBOT)).max()
+    at_samples = motor_uses_at(next(sample_paths((plan,), ROBOT)).motion, robot_parameters(ROBOT)).max()
     assert motor_use((plan,), ROBOT).use[0] == pytest.approx(at_samples, rel=1e-4)
 
 

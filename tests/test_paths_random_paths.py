@@ -165,7 +165,7 @@ def test_names_number_the_paths():
 
 
 def test_easing_lowers_all_rates_and_rounds_them_down_to_two_digits():
-    eased = RandomPaths(max_speed=0.8, max_acceleration=1.0, max_yaw_rate=1.5).eased(1.2)
+    eased = RandomPaths(max_speed=0.8, max_acceleration=1.0, max_yaw_rate=1.5).ease(1.2)
     assert (eased.max_speed, eased.max_acceleration, eased.max_yaw_rate) == (0.66, 0.83, 1.2)
     assert eased.remedy == "max_speed 0.66 m/s, max_acceleration 0.83 m/s² and max_yaw_rate 1.2 rad/s"
 

@@ -122,9 +122,9 @@ def test_a_square_may_be_all_corner_but_no_more():
 
 
 def test_easing_lengthens_the_duration_and_rounds_it_up_to_three_digits():
-    assert Circle(duration=10.0).eased(1.2345).duration == 12.4
-    assert Circle(duration=10.0).eased(2.0).duration == 20.0
-    assert Circle(duration=8.0).eased(1.12341).remedy == "a duration of at least 8.99 s"
+    assert Circle(duration=10.0).ease(1.2345).duration == 12.4
+    assert Circle(duration=10.0).ease(2.0).duration == 20.0
+    assert Circle(duration=8.0).ease(1.12341).remedy == "a duration of at least 8.99 s"
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ KEPT = 1.001  # of the margin: 0.03 % that laws may go beyond, and what the stee
 
 def use_along(course, robot):
     """Greatest use of the motors, at every 0.3 ms: closer than the points that the law looks at."""
-    return motor_use([course.timed(0.0003)], robot).use[0]
+    return motor_use([course.trajectory(0.0003)], robot).use[0]
 
 
 def with_friction(name, factor):

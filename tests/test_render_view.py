@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.render.view import Area, View, around, extent, fitted, grid, round_length
+from caster_gym.render.view import Area, View, extent, fit_view, grid, round_length, view_around
 from tests.scenes import CIRCLE, obstacles, scene
 
 AREA = Area(40.0, 10.0, 300.0, 200.0)
@@ -24,7 +24,7 @@ def test_metres_undo_pixels():
 
 @pytest.mark.parametrize(("low", "high"), [((0, 0), (6, 1)), ((-1, -5), (0, 5)), ((2, 2), (2, 2))])
 def test_what_is_fitted_lies_in_the_area_and_touches_its_edge(low, high):
-    corners = fitted(low, high, AREA).pixels([low, high])
+    corners = fit_view(low, high, AREA).pixels([low, high])
     assert (corners.min(axis=0) >= np.array([AREA.left, AREA.top]) - 1e-9).all()
     assert (corners.max(axis=0) <= np.array([AREA.left + AREA.width, AREA.top + AREA.height]) + 1e-9).all()
     share = np.ptp(corners, axis=0) / (AREA.width, AREA.height)
@@ -32,7 +32,7 @@ def test_what_is_fitted_lies_in_the_area_and_touches_its_edge(low, high):
 
 
 def test_a_view_around_a_point_shows_so_many_metres_of_the_shorter_side():
-    view = around((4.0, 4.0), 0.5, AREA)
+    view = view_around((4.0, 4.0), 0.5, AREA)
     top, bottom = view.metres([(190.0, 10.0), (190.0, 210.0)])
     assert top[1] - bottom[1] == pytest.approx(0.5)
     assert_allclose(view.pixels((4.0, 4.0)), AREA.centre)

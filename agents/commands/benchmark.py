@@ -19,7 +19,7 @@ from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, Frozen
-from caster_gym.engines.tensor.threads import DEFAULT, limited_to
+from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.file_names import NameOrFile
 from caster_gym.report.provenance import write_provenance
 from caster_gym.shipped_files import read_settings
@@ -93,7 +93,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
     test.reset(seed=settings.start_seed)
     test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
 
-    with limited_to(threads):
+    with limit_threads(threads):
         tuned = {
             name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ControllerSettings)
         }
@@ -110,7 +110,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
         for name, group in ready.items()
         for agent, seed in group
     ]
-    with limited_to(threads):
+    with limit_threads(threads):
         compared = compare(contenders, test, settings.start_seed, settings.settling)
     verdict = yardstick(bare(test).task).verdict
     histories = {job.name: read_history(job.folder / "validation.csv", verdict) for job in jobs}

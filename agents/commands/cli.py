@@ -145,10 +145,10 @@ def watch(
     with plain_errors():
         from caster_gym.agents.commands.selection import choose_task
         from caster_gym.agents.commands.watch import watch as run
-        from caster_gym.engines.tensor.threads import DEFAULT, limited_to
+        from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 
         settings, words = choose_task(agent, task)
-        with limited_to(DEFAULT):
+        with limit_threads(DEFAULT):
             frames = run(agent, settings, path, robots, seed, save, overwrite, seconds, begin=lambda: typer.echo(words))
         if save is not None:
             typer.echo(f"{frames} frames are in {save}.")

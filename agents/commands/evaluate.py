@@ -7,7 +7,7 @@ from caster_gym.agents.commands.command_line import files_among
 from caster_gym.agents.commands.selection import choose_agent, choose_task
 from caster_gym.agents.comparison.evaluation import test_batch
 from caster_gym.agents.comparison.results import Contender, compare, write_results
-from caster_gym.engines.tensor.threads import limited_to
+from caster_gym.engines.tensor.threads import limit_threads
 from caster_gym.report.provenance import write_provenance
 from caster_gym.report.run_folder import check_free, staged
 
@@ -18,7 +18,7 @@ def evaluate(policy: str, task: str | None, starts: int, out: Path, overwrite: b
     how = BenchmarkSettings(agents=(policy,), starts=starts)
     for read in files_among(task, settings.robot):
         check_free(out, overwrite, kept=read)
-    with limited_to(threads), staged(out, overwrite, kept=Path(policy)) as folder:
+    with limit_threads(threads), staged(out, overwrite, kept=Path(policy)) as folder:
         test = test_batch(settings, settings.test, starts)
         agent, tuned = choose_agent(policy, settings, test)
         compared = compare([Contender(agent.name, agent, None)], test, how.start_seed)

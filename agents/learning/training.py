@@ -18,7 +18,7 @@ from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training_run import Report, Run
 from caster_gym.engines.native.cores import usable_cores
-from caster_gym.engines.tensor.threads import DEFAULT, limited_to
+from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.report.provenance import write_provenance
 
 
@@ -32,7 +32,7 @@ def train(
     run = Run(folder, task, settings, seed, report)
     completed = False
     try:
-        with limited_to(threads):
+        with limit_threads(threads):
             settings.learn(run)
         completed = True
     finally:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from caster_gym.arrays import Array, Plane
 
 
-def turned(vector: Array, by: complex | Plane) -> Array:
+def turn_planar(vector: Array, by: complex | Plane) -> Array:
     """Vectors (..., 3) turned in the plane by unit numbers (...): by a heading from B to W, by its conjugate back."""
     plane = (vector[..., 0] + 1j * vector[..., 1]) * by
     return np.stack((plane.real, plane.imag, np.broadcast_to(vector[..., 2], plane.shape)), axis=-1)
@@ -30,5 +30,5 @@ def wrap_angle(angle: ArrayLike) -> Array:
 def motion_in_body(samples: Array) -> tuple[Array, Array]:
     """Twists in B and the derivatives of their components, (..., 3) each, of a trajectory's samples (..., 10)."""
     back = samples[..., 2] - 1j * samples[..., 3]
-    twist = turned(samples[..., 4:7], back)
-    return twist, rate_in_body(turned(samples[..., 7:10], back), twist)
+    twist = turn_planar(samples[..., 4:7], back)
+    return twist, rate_in_body(turn_planar(samples[..., 7:10], back), twist)

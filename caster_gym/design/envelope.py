@@ -32,8 +32,7 @@ from caster_gym.mechanics.motors import motor_speeds, torque_range
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten
 from caster_gym.paths.feasibility import least_effort
-from caster_gym.paths.moments import Motion, hard_spans, moments_within, motion_at, sampled
-from caster_gym.paths.moments import joined as joined_spans
+from caster_gym.paths.moments import Motion, hard_spans, join_spans, moments_within, motion_at, sample_paths
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
@@ -120,7 +119,7 @@ def path_loads(trajectories: Sequence[Trajectory], robot: Robot, margin: float =
     There it looks at moments at which a measure of some motor may be greater than at all samples.
     """
     parameters = robot_parameters(robot)
-    blocks = list(sampled(trajectories, robot))
+    blocks = list(sample_paths(trajectories, robot))
     values = [measures(_motion_loads(block.motion, robot, parameters), robot, margin) for block in blocks]
     greatest = np.maximum.reduce([found.max(axis=(1, 2), keepdims=True) for found in values])
     scale = 1.0 / np.where(greatest > 0.0, greatest, 1.0)
@@ -128,7 +127,7 @@ def path_loads(trajectories: Sequence[Trajectory], robot: Robot, margin: float =
     spans = [hard_spans(block, scale * found, best, robot) for block, found in zip(blocks, values, strict=True)]
     motions = [block.motion for block in blocks]
     closer = moments_within(
-        joined_spans(spans), best, lambda m: scale * measures(_motion_loads(m, robot, parameters), robot, margin), robot
+        join_spans(spans), best, lambda m: scale * measures(_motion_loads(m, robot, parameters), robot, margin), robot
     )
     motions += [motion_at(moments.rows, moments.psi) for moments in closer]
     loads = [_motion_loads(motion, robot, parameters) for motion in motions]

@@ -1,7 +1,6 @@
 """The mechanics on NumPy arrays."""
 
 import operator
-import reprlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
+from caster_gym.engines.model_inputs import ModelInputs
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.floor import Floor, FloorLike, load_floor
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
@@ -18,7 +18,7 @@ from caster_gym.mechanics.grip_or_slip import free_step
 from caster_gym.mechanics.impulse import ImpactLaw
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, robot_parameters
-from caster_gym.mechanics.scalars import Direction, Vector, each, flatten, pairs
+from caster_gym.mechanics.scalars import each, flatten, pairs
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings
 from caster_gym.mechanics.slip_state import rolling_state
 from caster_gym.robot import Robot, check_joints
@@ -26,7 +26,7 @@ from caster_gym.robot import Robot, check_joints
 ROUGHEST = 1e6  # [-] between hull and obstacles: a contact sticks long before
 
 
-class Model:
+class Model(ModelInputs):
     """Kinematics, dynamics, ground forces and impacts of a robot, on arrays whose leading axes are a batch.
 
     steering (..., N): angles δ from the body x-axis to each rolling direction [rad]
@@ -46,8 +46,6 @@ class Model:
     >>> states.shape, states[-1, :3].round(3)  # 1 s later: x, y [m], β [rad]
     ((201, 9), array([0.795, 0.   , 0.   ]))
     """
-
-    _arrays: Any = np
 
     def __init__(self, robot: Robot, dynamics: Dynamics = "exact", parameters: RobotParameters | None = None) -> None:
         if not isinstance(robot, Robot):
@@ -284,64 +282,6 @@ class Model:
     def _replaced(self, parameters: RobotParameters) -> Array | None:
         columns = np.broadcast_arrays(*pack_parameters(parameters))
         return np.stack([np.ravel(column) for column in columns], axis=1)
-
-    def _array(self, name: str, value: Any, last: int) -> Any:
-        """The value as an array of finite numbers whose last axis has the right length."""
-        array = self._numbers(name, value)
-        self._check_shape(name, array, last)
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-        return array
-
-    def _numbers(self, name: str, value: Any) -> Any:
-        """The value as an array."""
-        try:
-            return np.asarray(value, dtype=np.float64)
-        except (ValueError, TypeError) as error:
-            raise ValueError(f"{name} must hold real numbers, got {reprlib.repr(value)}") from error
-
-    @staticmethod
-    def _check_shape(name: str, array: Any, last: int) -> None:
-        if array.ndim == 0 or array.shape[-1] != last:
-            raise ValueError(f"{name} must have a last axis of {last}, got shape {tuple(array.shape)}")
-
-    def _components(self, name: str, value: Any, last: int) -> tuple[Any, ...]:
-        array = self._array(name, value, last)
-        return tuple(array[..., i] for i in range(last))
-
-    def _vector(self, name: str, value: Any) -> Vector:
-        x, y, z = self._components(name, value, 3)
-        return x, y, z
-
-    def _wrench(self, wrench: Any) -> Vector:
-        return (0.0, 0.0, 0.0) if wrench is None else self._vector("wrench", wrench)
-
-    def _unit(self, angle: Any) -> Direction:
-        return self._arrays.cos(angle), self._arrays.sin(angle)
-
-    def _directions(self, steering: Any) -> tuple[Direction, ...]:
-        return tuple(self._unit(angle) for angle in self._components("steering", steering, self.robot.caster_count))
-
-    def _torques(self, torque: Any) -> tuple[tuple[Any, Any], ...]:
-        return pairs(self._components("torque", torque, 2 * self.robot.caster_count))
-
-    def _in_range(self, name: str, value: Any, low: float, high: float) -> Any:
-        number = self._numbers(name, value)
-        wrong = ~((number >= low) & (number <= high))  # so that what is no number is wrong too
-        if bool(wrong.any()):
-            raise ValueError(f"{name} must lie in {low:g} … {high:g}, got {float(number[wrong][0]):g}")
-        return number
-
-    def _follow(self, angle: Any, f: Direction) -> Any:
-        """The angle of a direction, on the turn nearest to the angle before."""
-        c, s = self._unit(angle)
-        return angle + self._arrays.atan2(f[1] * c - f[0] * s, f[0] * c + f[1] * s)
-
-    def _scalar(self, value: Any) -> Array:
-        return np.asarray(value)
-
-    def _stack(self, parts: Any, axis: int = -1) -> Array:
-        return np.stack(np.broadcast_arrays(*parts), axis)
 
 
 def _listed(joints: str | Sequence[str]) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from caster_gym.envs.task import Task
 from caster_gym.envs.track_task import TrackTask
 from caster_gym.envs.tracking import OBSERVATION_LIMIT, Terms
 from caster_gym.floor import Floor
-from caster_gym.mechanics.floor import check_slips, robot_on, where_it_grips_most
+from caster_gym.mechanics.floor import check_slips, robot_on, with_greatest_friction
 from caster_gym.mechanics.separation import Surroundings
 from caster_gym.paths.specification import AnyPath, build_trajectories, read_paths
 from caster_gym.paths.specification import PathLike as PathLike
@@ -175,7 +175,7 @@ def _chosen(robot: RobotLike, actuation: Actuation, floor: Floor | None) -> Robo
         check_slips(chosen)
         chosen = robot_on(chosen, floor)
     warn_if_singular(chosen)
-    warn_if_lifting(chosen if floor is None else where_it_grips_most(chosen, floor))
+    warn_if_lifting(chosen if floor is None else with_greatest_friction(chosen, floor))
     return chosen
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from pydantic import BaseModel
 
-from caster_gym.paths.timed import timed_from
+from caster_gym.paths.timed import timed_path
 from caster_gym.paths.trajectory import Trajectory
 
 
@@ -22,7 +22,7 @@ def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
 def plain(value: Any) -> Any:
     """What a robot, a path or any other part of a description is in YAML; what has no such form stays as it is."""
     if isinstance(value, Trajectory):
-        return plain(timed_from(value))
+        return plain(timed_path(value))
     if isinstance(value, BaseModel):
         return {name: plain(getattr(value, name)) for name in type(value).model_fields}
     if isinstance(value, Mapping):

@@ -84,10 +84,10 @@ def identify(
         except ContradictionError as error:
             raise ContradictionError(f"{recording}: {error}") from None
     with staged(out, overwrite) as folder:
-        from caster_gym.engines.tensor.threads import DEFAULT, limited_to
+        from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
         from caster_gym.identification.fit import identify as estimate  # late: Torch takes seconds
 
-        with limited_to(DEFAULT):
+        with limit_threads(DEFAULT):
             found = estimate(
                 robot,
                 recorded,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from caster_gym.mechanics.contact_impulses import hold
 from caster_gym.mechanics.first_contact import FOUND, first_contact, sweep_between
-from caster_gym.mechanics.grip_or_slip import careful_step, impact, power, response
+from caster_gym.mechanics.grip_or_slip import impact, power, response, step_with_use_apart
 from caster_gym.mechanics.ground import FloorUse
 from caster_gym.mechanics.integration import State, difference, pack_state, state_where, unit
 from caster_gym.mechanics.linear import rotate, scale, scale_pair
@@ -144,7 +144,7 @@ def guarded_step(
         push, pressing = (nothing, nothing, nothing), nothing
         if anywhere(nearest < TOUCH):
             push, pressing = holding_force(lifted, torques, wrench, trial, robot, hull, obstacles, first, end, surface)
-        target, asks = careful_step(lifted, torques, add(wrench, push), trial, robot, surface)
+        target, asks = step_with_use_apart(lifted, torques, add(wrench, push), trial, robot, surface)
         (doubt,) = total(each(difference, (), pack_state(target)))
         hit = trial
         if anywhere(landing < 0.5):

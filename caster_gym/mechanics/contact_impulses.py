@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from caster_gym.mechanics import contact_table as row
 from caster_gym.mechanics.contact_table import contact_of, gather
-from caster_gym.mechanics.impulse import Mobility, impact, pushed
+from caster_gym.mechanics.impulse import Mobility, add_impulses, impact
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.linear import dot, multiply, shift, subtract
 from caster_gym.mechanics.scalars import (
@@ -76,7 +76,7 @@ def settle(v: Vector, table: Any, count: int, friction: Scalar) -> Vector:
             d_n, d_t = where(acts, j_n - along, nothing), where(acts, j_t - across, nothing)
             table[at + row.ALONG], table[at + row.CHANGE_ALONG] = along + d_n, d_n
             table[at + row.ACROSS], table[at + row.CHANGE_ACROSS] = across + d_t, d_t
-            after = pushed(after, d_n, one.m_n, d_t, one.m_t)
+            after = add_impulses(after, d_n, one.m_n, d_t, one.m_t)
             change = maximum(absolute(d_n) * dot(one.n, one.m_n), absolute(d_t) * dot(one.t, one.m_t))
             changing = changing | (change > settled)
         v = after
@@ -92,7 +92,7 @@ def sum_of(table: Any, count: int, nothing: Scalar) -> tuple[Vector, Scalar]:
     for j in range(count):
         one = contact_of(table, j)
         along, across = table[row.FIELDS * j + row.ALONG], table[row.FIELDS * j + row.ACROSS]
-        x, y, z = pushed((x, y, z), along, one.n, across, one.t)
+        x, y, z = add_impulses((x, y, z), along, one.n, across, one.t)
         normal = normal + along
     return (x, y, z), normal
 
@@ -114,8 +114,8 @@ def strike_alone(v: Vector, table: Any, count: int, restitution: Scalar, obstacl
         w = Mobility(dot(one.n, one.m_n), dot(one.n, one.m_t), dot(one.t, one.m_t))
         j_n, j_t = impact(before, dot(one.t, v), w, restitution, obstacles.friction, obstacles.law)
         acts = before < -STILL
-        after = each(where, (acts,), pushed(v, j_n, one.m_n, j_t, one.m_t), after)
-        wrench = each(where, (acts,), pushed((nothing, nothing, nothing), j_n, one.n, j_t, one.t), wrench)
+        after = each(where, (acts,), add_impulses(v, j_n, one.m_n, j_t, one.m_t), after)
+        wrench = each(where, (acts,), add_impulses((nothing, nothing, nothing), j_n, one.n, j_t, one.t), wrench)
         normal = where(acts, j_n, normal)
     approaches = nothing > 1.0
     for j in range(count):

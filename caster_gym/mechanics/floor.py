@@ -52,7 +52,7 @@ def robot_on(robot: Robot, floor: Floor) -> Robot:
     return robot if floor.friction is None else robot.model_copy(update={"floor_friction": floor.friction})
 
 
-def where_it_grips_most(robot: Robot, floor: Floor) -> Robot:
+def with_greatest_friction(robot: Robot, floor: Floor) -> Robot:
     """A robot where the floor has its greatest friction, be it that of a patch."""
     greatest = max((robot_on(robot, floor).floor_friction, *(patch.friction for patch in floor.patches)))
     return robot.model_copy(update={"floor_friction": greatest})

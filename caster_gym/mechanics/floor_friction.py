@@ -11,7 +11,7 @@ Newton's method is needed for those three alone, in a fixed number of rounds wit
 
 from typing import NamedTuple
 
-from caster_gym.mechanics.linear import dot, factors, multiply, scale, scale_pair, shift, substitute, subtract
+from caster_gym.mechanics.linear import dot, factors, length, multiply, scale, scale_pair, shift, substitute, subtract
 from caster_gym.mechanics.scalars import (
     Direction,
     Scalar,
@@ -64,9 +64,9 @@ def impulse_limit(time: Scalar, force: Scalar) -> Limit:
     return Limit(some, 1.0 / some)
 
 
-def sliding(u: Direction, limit: Limit) -> Scalar:
+def slide_ratio(u: Direction, limit: Limit) -> Scalar:
     """rho of a wheel that slides on as it does."""
-    return sqrt(u[0] * u[0] + u[1] * u[1]) * limit.inverse
+    return length(u) * limit.inverse
 
 
 def unheld_velocity(change: Vector, footing: Footing) -> Direction:
@@ -166,7 +166,7 @@ def work_parts(wheel: Grip, before: Direction, answer: Direction) -> tuple[Scala
     return p * before[0] + q * before[1], p * answer[0] + q * answer[1]
 
 
-def lessened(share: Scalar, wheel: Grip) -> Grip:
+def lessen(share: Scalar, wheel: Grip) -> Grip:
     """A wheel with a share of its impulse."""
     return Grip(scale_pair(share, wheel.impulse), wheel.slide, wheel.stiffness)
 
@@ -196,4 +196,4 @@ def final_impulses(change: Vector, problem: Problem, slides: tuple[Scalar, ...])
     nothing = 0.0 * resisted
     share = clip(-gained / maximum(resisted, TINY + nothing), nothing, 1.0 + nothing)  # (S14)
     step = scale(share, by_floor)
-    return add(alone, step), each(lessened, (share,), grips)
+    return add(alone, step), each(lessen, (share,), grips)

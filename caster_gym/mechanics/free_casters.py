@@ -243,7 +243,7 @@ def floor_push(f: Direction, force: Pair, caster: CasterParameters) -> Forces:
     )
 
 
-def both(a: Forces, b: Forces) -> Forces:
+def add_forces(a: Forces, b: Forces) -> Forces:
     """Two forces together."""
     return Forces(a.at_eta + b.at_eta, a.at_theta + b.at_theta, add(a.at_platform, b.at_platform))
 
@@ -266,7 +266,9 @@ def slip_dynamics(
     slopes = each(friction_slopes, (v[2], robot.platform.coulomb_speed), rates, robot.casters)
     given = each(joint_forces, (v[2],), torques, rates, slopes)
     taken = each(turning_forces, (v,), directions, rates, robot.casters)
-    forces = each(both, (), each(balance, (), given, taken), each(floor_push, (), directions, floor, robot.casters))
+    forces = each(
+        add_forces, (), each(balance, (), given, taken), each(floor_push, (), directions, floor, robot.casters)
+    )
     felt = total(each(felt_force, (), edges, forces))
     h = platform_bias(v, robot.platform)
     whole = add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges)))

@@ -40,25 +40,25 @@ def slipping_step(
     return end
 
 
-def noted_step(
+def step_with_use(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
 ) -> tuple[State, FloorUse]:
     """The same, and what the floor was asked."""
     given = state, torques, wrench, h, robot
-    found: tuple[State, FloorUse] = either(surface, noted_rolling_step, noted_slipping_step, given)
+    found: tuple[State, FloorUse] = either(surface, rolling_step_with_use, slipping_step_with_use, given)
     return found
 
 
-def careful_step(
+def step_with_use_apart(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters, surface: Any
 ) -> tuple[State, FloorUse]:
     """The same as part of a step among obstacles, which is compiled for one robot at a time."""
     given = state, torques, wrench, h, robot
-    found: tuple[State, FloorUse] = either(surface, noted_rolling_step, careful_slipping_step, given)
+    found: tuple[State, FloorUse] = either(surface, rolling_step_with_use, slipping_step_with_use_apart, given)
     return found
 
 
-def noted_rolling_step(
+def rolling_step_with_use(
     state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[State, FloorUse]:
     """What it is asked at the start."""
@@ -66,7 +66,7 @@ def noted_rolling_step(
     return rk4_step(state, torques, wrench, h, robot), asks
 
 
-def noted_slipping_step(
+def slipping_step_with_use(
     surface: Surface, state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[State, FloorUse]:
     """What it gave; it gives no more than it has."""
@@ -74,7 +74,7 @@ def noted_slipping_step(
     return end, use_of(footfall)
 
 
-def careful_slipping_step(
+def slipping_step_with_use_apart(
     surface: Surface, state: State, torques: tuple[Pair, ...], wrench: Vector, h: Scalar, robot: RobotParameters
 ) -> tuple[State, FloorUse]:
     """What it gave."""

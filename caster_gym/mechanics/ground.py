@@ -205,7 +205,7 @@ def lifts(load: Scalar) -> tuple[Scalar]:
     return (where(load > 0.0, 0.0 * load, 1.0 + 0.0 * load),)
 
 
-def sole(load: Scalar) -> tuple[Scalar]:
+def single(load: Scalar) -> tuple[Scalar]:
     """A load as a tuple, to be summed."""
     return (load,)
 
@@ -221,7 +221,7 @@ def floor_use(
     v_rate = forward_dynamics(v, directions, torques, wrench, robot)
     forces = each(ground_force, (v, v_rate, robot.platform.coulomb_speed), directions, robot.casters, torques)
     loads = wheel_loads(directions, tilt(v, v_rate, directions, wrench, robot), robot)
-    (whole,) = total(each(sole, (), loads))
+    (whole,) = total(each(single, (), loads))
     least = LEAST_LOAD * whole / len(loads)
     uses = each(wheel_use, (least, robot.platform.floor_friction), forces, loads)
     (lifted,) = total(each(lifts, (), loads))
@@ -235,7 +235,7 @@ def impact_traction(change: Vector, directions: tuple[Direction, ...], robot: Ro
     """
     impulses = each(floor_impulse, (change,), directions, robot.casters)
     loads = wheel_loads(directions, (0.0, 0.0), robot)
-    (whole,) = total(each(sole, (), loads))
+    (whole,) = total(each(single, (), loads))
     shared = LEAST_LOAD * whole / len(loads), robot.platform.floor_friction * CONTACT_TIME
     return greatest(each(wheel_use, shared, impulses, loads))  # (G9)
 

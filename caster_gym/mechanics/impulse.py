@@ -32,7 +32,7 @@ def contact_rows(point: tuple[Scalar, Scalar], normal: tuple[Scalar, Scalar]) ->
     return (nx, ny, px * ny - py * nx), (-ny, nx, px * nx + py * ny)
 
 
-def pushed(v: Vector, j_n: Scalar, m_n: Vector, j_t: Scalar, m_t: Vector) -> Vector:
+def add_impulses(v: Vector, j_n: Scalar, m_n: Vector, j_t: Scalar, m_t: Vector) -> Vector:
     """Twist after impulses along normal and tangent; m_n, m_t: what a unit of each changes it by."""
     return (
         v[0] + m_n[0] * j_n + m_t[0] * j_t,
@@ -112,4 +112,4 @@ def collide(
     m_n, m_t = solve(m, n), solve(m, t)
     w = Mobility(dot(n, m_n), dot(n, m_t), dot(t, m_t))
     j_n, j_t = impact(dot(n, v), dot(t, v), w, restitution, friction, law)
-    return j_n, j_t, pushed(v, j_n, m_n, j_t, m_t)
+    return j_n, j_t, add_impulses(v, j_n, m_n, j_t, m_t)

@@ -35,6 +35,11 @@ def shift_pair(h: Scalar, a: Direction, b: Direction) -> Direction:
     return a[0] + h * b[0], a[1] + h * b[1]
 
 
+def length(a: Direction) -> Scalar:
+    """|a|, of a vector of the plane."""
+    return sqrt(a[0] * a[0] + a[1] * a[1])
+
+
 def rotate(f: Direction, a: Direction) -> Direction:
     """A vector of the plane turned by the angle of a unit vector: from components along f and f⊥ to those beside f."""
     return f[0] * a[0] - f[1] * a[1], f[1] * a[0] + f[0] * a[1]

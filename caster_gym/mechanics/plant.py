@@ -3,13 +3,13 @@
 from typing import Any, NamedTuple
 
 from caster_gym.mechanics.contact import Touch, guarded_step
-from caster_gym.mechanics.free_casters import Pair
-from caster_gym.mechanics.grip_or_slip import all_joint_rates, noted_step
+from caster_gym.mechanics.grip_or_slip import all_joint_rates, step_with_use
 from caster_gym.mechanics.ground import FloorUse
 from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.linear import length
 from caster_gym.mechanics.motors import joint_torques, motor_speeds, motor_torques
 from caster_gym.mechanics.parameters import RobotParameters
-from caster_gym.mechanics.scalars import Scalar, Vector, each, sqrt, total
+from caster_gym.mechanics.scalars import Scalar, Vector, each, total
 from caster_gym.mechanics.separation import Hull, Obstacles
 from caster_gym.mechanics.slip_state import slips_of
 
@@ -61,18 +61,13 @@ def driven_step(
     before = all_motor_speeds(state, robot, surface)
     torques = each(motor_torques, (), commands, before, robot.casters)
     at_joints = each(joint_torques, (), torques, robot.casters)
-    end, asks = noted_step(state, at_joints, wrench, h, robot, surface)
+    end, asks = step_with_use(state, at_joints, wrench, h, robot, surface)
     return end, Drive(torques, power_between(before, torques, end, robot, surface), asks)
-
-
-def slip_speed(u: Pair) -> Scalar:
-    """Speed of a wheel over the floor from its velocity. [m/s]"""
-    return sqrt(u[0] * u[0] + u[1] * u[1])
 
 
 def slip_speeds(state: State, robot: RobotParameters) -> tuple[Scalar, ...]:
     """How fast each wheel that may slip does. [m/s]"""
-    return each(slip_speed, (), slips_of(state, robot))
+    return each(length, (), slips_of(state, robot))
 
 
 def guarded_driven_step(

@@ -19,9 +19,9 @@ from caster_gym.mechanics.floor_friction import (
     floor_stiffness,
     impulse_limit,
     impulses_change,
-    lessened,
+    lessen,
     newton_round,
-    sliding,
+    slide_ratio,
     used_share,
 )
 from caster_gym.mechanics.free_casters import (
@@ -59,7 +59,7 @@ from caster_gym.mechanics.scalars import (
     where,
 )
 from caster_gym.mechanics.slip_energy import explained_share
-from caster_gym.mechanics.slip_state import moved, slips_of, with_velocities
+from caster_gym.mechanics.slip_state import move, slips_of, with_velocities
 from caster_gym.mechanics.slip_tilt import tilt_after
 
 Pair = tuple[Scalar, Scalar]
@@ -99,7 +99,7 @@ def lasting_slide(before: Pair, halfway: Pair, free: Pair) -> Pair:
     return free[0] + lasts * before[0], free[1] + lasts * before[1]
 
 
-def opposing(footings: Footing, against: Pair) -> Footing:
+def oppose(footings: Footing, against: Pair) -> Footing:
     """A footing whose impulse opposes another velocity."""
     return Footing(against, footings.rows, footings.mobility)
 
@@ -176,12 +176,12 @@ def limit_of(time: Scalar, friction: Scalar, load: Scalar) -> Limit:
     return impulse_limit(time, friction * load)
 
 
-def slower(before: Limit, after: Limit, slide: Scalar) -> Scalar:
+def slide_against(before: Limit, after: Limit, slide: Scalar) -> Scalar:
     """rho of a wheel that slides as fast against another limit."""
     return slide * before.most * after.inverse
 
 
-def lag(was: Pair, shall_be: Pair, caster: CasterParameters) -> Vector:
+def lag_wrench(was: Pair, shall_be: Pair, caster: CasterParameters) -> Vector:
     """Wrench at C of the difference of two impulses at a pivot."""
     x, y = was[0] - shall_be[0], was[1] - shall_be[1]
     return x, y, caster.x * y - caster.y * x
@@ -197,15 +197,15 @@ def turning_lag(
     """What the floor's impulses along the directions of a step's middle have more than along those of its end. (S9)"""
     impulses = each(impulse_of, (), grips)
     was, shall_be = each(rotate, (), middle, impulses), each(rotate, (), ahead, impulses)
-    return scale(times, total(each(lag, (), was, shall_be, robot.casters)))
+    return scale(times, total(each(lag_wrench, (), was, shall_be, robot.casters)))
 
 
-def within(wheel: Grip, limit: Limit) -> Grip:
+def limit_grip(wheel: Grip, limit: Limit) -> Grip:
     """A wheel of the half step whose impulse is no more than half of what the whole step allows."""
     p, q = wheel.impulse
     one = 1.0 + 0.0 * p
     share = 1.0 / maximum(one, 2.0 * sqrt(p * p + q * q) * limit.inverse)
-    return lessened(share, wheel)
+    return lessen(share, wheel)
 
 
 def slip_step(
@@ -219,12 +219,12 @@ def slip_step(
     """One step of h seconds under constant torques and wrench; frictions: coefficients of the floor, a wheel each."""
     nothing = (0.0 * state.twist[0], 0.0 * state.twist[0], 0.0 * state.twist[0])
     half = 0.5 * h
-    there = moved(half, state, state)
+    there = move(half, state, state)
     part = stage(half, state, state, there.directions, nothing, torques, wrench, robot)
     first_loads = wheel_loads(state.directions, state.tilt, robot)
     limits = each(limit_of, (half,), frictions, first_loads)
     slips = slips_of(state, robot)
-    slides = each(sliding, (), slips, limits)
+    slides = each(slide_ratio, (), slips, limits)
     change = nothing
     problem = part.inertia, part.force, part.footings, limits
     change, slides = newton_round(change, 0.5, problem, slides)
@@ -235,17 +235,17 @@ def slip_step(
     tilted = tilt_after(change, rates, state, middle, half, wrench, robot)
     loads = each(lasting_load, (), first_loads, wheel_loads(there.directions, tilted, robot))
     before, limits = limits, each(limit_of, (h,), frictions, loads)
-    grips = each(within, (), grips, limits)
+    grips = each(limit_grip, (), grips, limits)
     change = impulses_change(problem, grips)
     rates = rates_after(change, grips, part, robot)
     middle = with_velocities(there, add(state.twist, change), rates, state.tilt)
-    end = moved(h, state, middle)
+    end = move(h, state, middle)
     known = turning_lag(grips, 2.0, middle.directions, end.directions, robot)
     part = stage(h, state, middle, end.directions, known, torques, wrench, robot)
     halfway = each(slip_velocity, (middle.twist,), middle.directions, rates, robot.casters)
     against = each(lasting_slide, (), slips, halfway, each(free_of, (), part.footings))
-    footings = each(opposing, (), part.footings, against)
-    slides = each(slower, (), before, limits, slides)
+    footings = each(oppose, (), part.footings, against)
+    slides = each(slide_against, (), before, limits, slides)
     problem = part.inertia, part.force, footings, limits
     change, slides = newton_round(scale(2.0, change), 0.5, problem, slides)
     change, slides = newton_round(change, 0.0, problem, slides)

@@ -35,9 +35,9 @@ from caster_gym.mechanics.free_casters import (
 )
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.linear import scale, shift, solve
+from caster_gym.mechanics.linear import length, scale, shift, solve
 from caster_gym.mechanics.parameters import RobotParameters
-from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, add, clip, each, greatest, sqrt, total
+from caster_gym.mechanics.scalars import Scalar, Symmetric, Vector, add, clip, each, greatest, total
 from caster_gym.mechanics.slip import footing, impulse_of
 from caster_gym.mechanics.slip_state import slips_of, with_velocities
 
@@ -55,12 +55,12 @@ class ImpactFooting(NamedTuple):
 
 def fading_limit(contact_time: Scalar, friction: Scalar, load: Scalar, u: Pair) -> Limit:
     """Greatest impulse of the floor on a wheel over the contact time; none on one that slides already."""
-    slides = sqrt(u[0] * u[0] + u[1] * u[1])
+    slides = length(u)
     fades = clip(2.0 - slides / RESTING, 0.0 * slides, 1.0 + 0.0 * slides)
     return impulse_limit(contact_time, friction * load * fades)  # (S16)
 
 
-def held_at_first(limit: Limit) -> Scalar:
+def zero_slide(limit: Limit) -> Scalar:
     """rho of a wheel that is held."""
     return 0.0 * limit.most
 
@@ -77,7 +77,7 @@ def impact_footing(state: State, surface: Surface, robot: RobotParameters) -> Im
         add(platform_inertia(robot.platform), total(each(edge_inertia, (), edges))),
         each(footing, (), before, rows, each(floor_mobility, (), owns, robot.casters)),
         limits,
-        each(held_at_first, (), limits),
+        each(zero_slide, (), limits),
         owns,
         edges,
     )

@@ -34,7 +34,7 @@ def rolling_rates(v: Vector, f: Direction, caster: CasterParameters) -> Pair:
     return eta, theta
 
 
-def turned(f: Direction, angle: Scalar) -> Direction:
+def turn_by(f: Direction, angle: Scalar) -> Direction:
     """A direction turned by an angle, of second order in it, and no longer or shorter than it was."""
     t = 0.5 * angle
     scale = 1.0 / (1.0 + t * t)
@@ -42,17 +42,17 @@ def turned(f: Direction, angle: Scalar) -> Direction:
     return c * f[0] - s * f[1], s * f[0] + c * f[1]
 
 
-def steered(h: Scalar, omega: Scalar, f: Direction, rates: Pair) -> Direction:
+def steer(h: Scalar, omega: Scalar, f: Direction, rates: Pair) -> Direction:
     """Rolling direction in B after h seconds."""
-    return turned(f, h * (rates[0] - omega))
+    return turn_by(f, h * (rates[0] - omega))
 
 
-def moved(h: Scalar, state: State, along: State) -> State:
+def move(h: Scalar, state: State, along: State) -> State:
     """The state h seconds on with the velocities of another; its own velocities as they are."""
     vx, vy, omega = along.twist
     position = shift_pair(h, state.position, rotate(along.heading, (vx, vy)))
-    directions = each(steered, (h, omega), state.directions, along.rates)
-    return State(position, turned(state.heading, h * omega), state.twist, directions, state.rates, state.tilt)
+    directions = each(steer, (h, omega), state.directions, along.rates)
+    return State(position, turn_by(state.heading, h * omega), state.twist, directions, state.rates, state.tilt)
 
 
 def with_velocities(state: State, twist: Vector, rates: tuple[Pair, ...], tilt: Pair) -> State:

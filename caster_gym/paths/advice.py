@@ -18,9 +18,9 @@ class Adaptable(Protocol):
     def duration(self) -> float: ...
     @property
     def remedy(self) -> str: ...
-    def eased(self, factor: float) -> Self: ...
+    def ease(self, factor: float) -> Self: ...
     def with_fixed_heading(self) -> Self | None: ...
-    def wider(self) -> Iterator[tuple[Self, str]]: ...
+    def widen(self) -> Iterator[tuple[Self, str]]: ...
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]: ...
 
 
@@ -34,13 +34,13 @@ def timed_remedy(path: Adaptable, robot: Robot, time_step: float) -> str | None:
             return " and ".join(words)
         long_enough = max(1.0, LEAST_STEPS * time_step / one.duration)
         factors = [long_enough * factor for factor in _FACTORS]
-        found = next((factor for factor in factors if _drivable(one.eased(factor), robot, time_step)), None)
+        found = next((factor for factor in factors if _drivable(one.ease(factor), robot, time_step)), None)
         if found is not None:
             low = max(1.0, 0.5 * found)
             for _ in range(_HALVINGS):
                 middle = (low * found) ** 0.5
-                low, found = (low, middle) if _drivable(one.eased(middle), robot, time_step) else (middle, found)
-            return " and ".join([*words, one.eased(found).remedy])
+                low, found = (low, middle) if _drivable(one.ease(middle), robot, time_step) else (middle, found)
+            return " and ".join([*words, one.ease(found).remedy])
     return None
 
 

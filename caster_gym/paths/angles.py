@@ -19,11 +19,11 @@ _CALM = 1.0  # [rad] from row to row: in between, angles that are wrapped jump b
 _MANY = 10  # rows that show what is usual
 
 
-def plain(values: Any) -> Any:
+def plain_lists(values: Any) -> Any:
     """Lists and numbers of Python instead of NumPy's, however deep."""
     if isinstance(values, np.ndarray | np.generic):
         return values.tolist()
-    return [plain(value) for value in values] if isinstance(values, list | tuple) else values
+    return [plain_lists(value) for value in values] if isinstance(values, list | tuple) else values
 
 
 def read_angle(content: Any, key: str) -> Any:

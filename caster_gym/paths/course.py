@@ -8,7 +8,7 @@ import numpy as np
 from caster_gym.arrays import Array, Plane
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.arc_length import LINE_COLUMNS, CoarseSpacingError, Line, NoLineError, between, line_along
-from caster_gym.paths.specification import AnyPath, PathLike, named_apart, read_paths
+from caster_gym.paths.specification import AnyPath, PathLike, distinct_names, read_paths
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.time_law import fastest_laws, row_times
 from caster_gym.paths.timed import Timed
@@ -63,7 +63,7 @@ class Course:
         """Time that the law takes from rest to rest. [s]"""
         return float(row_times(self.samples[:, -1], self.spacing)[-1])
 
-    def timed(self, time_step: float) -> Trajectory:
+    def trajectory(self, time_step: float) -> Trajectory:
         """The course driven at its law, sampled at a constant time step [s]; the last sample rests at the end."""
         check_time_step(time_step)
         times, square = row_times(self.samples[:, -1], self.spacing), self.samples[:, -1]
@@ -114,7 +114,7 @@ def build_courses(
         way = specification.geometry() if isinstance(specification, Timed) else specification
         made = _lines(way, robot, spacing, free_heading, specification)
         lines.extend(line if way is specification else line._replace(name=specification.shape) for line in made)
-    names = named_apart([line.name for line in lines])
+    names = distinct_names([line.name for line in lines])
     lines = [line._replace(name=name) for line, name in zip(lines, names, strict=True)]
     laws = fastest_laws(lines, robot, speed_limit, margin)
     return tuple(
@@ -151,7 +151,7 @@ def _lines(
 
 def _wider(specification: AnyPath, source: AnyPath) -> Iterator[tuple[AnyPath, str]]:
     """Wider versions of a specification, as its source would give them."""
-    for one, words in specification.wider():
+    for one, words in specification.widen():
         if isinstance(source, Timed) and isinstance(one, Spline):
             yield source.model_copy(update={"tolerance": one.tolerance}).geometry(), words
         else:

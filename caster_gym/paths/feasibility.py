@@ -26,10 +26,10 @@ from caster_gym.paths.moments import (
     Motion,
     Spans,
     hard_spans,
-    joined,
+    join_spans,
     moments_within,
     motion_at,
-    sampled,
+    sample_paths,
 )
 from caster_gym.paths.trajectory import COLUMNS, LEAST_STEPS, Trajectory
 from caster_gym.robot import Robot
@@ -64,7 +64,7 @@ class Easable(Protocol):
     def duration(self) -> float: ...
     @property
     def remedy(self) -> str: ...
-    def eased(self, factor: float) -> Self: ...
+    def ease(self, factor: float) -> Self: ...
     def trajectories(self, time_step: float) -> tuple[Trajectory, ...]: ...
 
 
@@ -78,15 +78,15 @@ def motor_use(trajectories: Sequence[Trajectory], robot: Robot) -> MotorUse:
 
     hardest = _Hardest(len(trajectories), robot.caster_count)
     spans: list[Spans] = []
-    for block in sampled(trajectories, robot):
+    for block in sample_paths(trajectories, robot):
         found = motor_uses_at(block.motion, numbers)
         hardest.note_samples(block, found)
         spans.append(hard_spans(block, found, hardest.use, robot))
     for moments in moments_within(
-        joined(spans), hardest.use.copy(), lambda motion: motor_uses_at(motion, numbers), robot
+        join_spans(spans), hardest.use.copy(), lambda motion: motor_uses_at(motion, numbers), robot
     ):
         hardest.note(moments)
-    return hardest.told(numbers)
+    return hardest.motor_use(numbers)
 
 
 def motor_uses_at(motion: Motion, robot: RobotParameters) -> Array:
@@ -129,7 +129,7 @@ class _Hardest:
     def _keep(self, path: Indices, use: Array, joint: Indices, time: Array) -> None:
         self.use[path], self._joint[path], self._time[path] = use, joint, time
 
-    def told(self, robot: RobotParameters) -> MotorUse:
+    def motor_use(self, robot: RobotParameters) -> MotorUse:
         """What the motors do at these moments."""
         _, *states = _motors(motion_at(self._rows, self._psi), robot)
         torque, left, speed = (state[self._joint, np.arange(len(self.use))] for state in states)
@@ -183,7 +183,7 @@ def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
     steps = max(np.ceil(path.duration / time_step), LEAST_STEPS)
 
     def use(factor: float) -> float:
-        slower = path.eased(factor)
+        slower = path.ease(factor)
         return float(motor_use(slower.trajectories(slower.duration / steps), robot).use.max())  # as many are quicker
 
     high, asked = 1.0, np.inf
@@ -197,11 +197,11 @@ def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
         middle = (low * high) ** 0.5
         low, high = (low, middle) if use(middle) <= SURE else (middle, high)
     try:
-        while greatest_use(path.eased(high), time_step, robot) > SURE:  # the duration is one of whole steps
+        while greatest_use(path.ease(high), time_step, robot) > SURE:  # the duration is one of whole steps
             high *= _PRECISION
     except ValueError:
         return f"it must be driven {high:.3g} times as slowly, which takes more time steps than a path may have"
-    return f"{path.eased(high).remedy} would do"
+    return f"{path.ease(high).remedy} would do"
 
 
 def _motors(motion: Motion, robot: RobotParameters) -> tuple[Array, Array, Array, Array]:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
 
 from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import ConfigurationError, Frozen
-from caster_gym.paths.angles import AngleUnit, plain, read_angle, read_angles
+from caster_gym.paths.angles import AngleUnit, plain_lists, read_angle, read_angles
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 
@@ -110,7 +110,7 @@ class Profile(_Kind):
     @model_validator(mode="before")
     @classmethod
     def _in_radians(cls, content: Any) -> Any:
-        angles = plain(content.get("angles")) if isinstance(content, Mapping) else None
+        angles = plain_lists(content.get("angles")) if isinstance(content, Mapping) else None
         if not isinstance(angles, list):
             return content
         turned, unit = read_angles(angles, content.get("unit"), "an angle")
@@ -129,12 +129,12 @@ class Profile(_Kind):
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """As for Tangent."""
         from caster_gym.paths.interpolation import open_spline  # SciPy takes a while to import
-        from caster_gym.paths.smoothing import smoothed
+        from caster_gym.paths.smoothing import fit_smoothing_spline
 
         angles = np.asarray(self.angles)
         at = np.linspace(0.0, 1.0, len(angles)) if self.progress is None else np.asarray(self.progress)
         if self._allowed[0] > 0.0 and len(angles) > 2:
-            spline = smoothed(angles[:, None], at, np.ones(len(at)), self._allowed[0], False)
+            spline = fit_smoothing_spline(angles[:, None], at, np.ones(len(at)), self._allowed[0], False)
             angle, first, second = (spline(share, order)[:, 0] for order in range(3))
         else:
             angle, first, second, _ = open_spline(at, angles, share)

@@ -15,7 +15,7 @@ from caster_gym.arrays import Array
 _BENT = 1.5 / 8.0  # [-] a parabola leaves the line by 1/8 of the second difference; half as much more if that changes
 
 
-def in_between(
+def motion_between(
     start: tuple[Array, Array, Array], end: tuple[Array, Array, Array], time: Array, share: Array, room: Array
 ) -> tuple[Array, Array, Array]:
     """Place, velocity and acceleration at shares 0 … 1 of a time [s] between the same three at both ends."""

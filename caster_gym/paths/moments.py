@@ -20,7 +20,7 @@ from caster_gym.mechanics.caster import joint_rates
 from caster_gym.mechanics.dynamics import joint_friction
 from caster_gym.mechanics.parameters import CasterParameters, robot_parameters
 from caster_gym.mechanics.scalars import Direction, Vector, each, flatten
-from caster_gym.paths.in_between import in_between, room_for
+from caster_gym.paths.in_between import motion_between, room_for
 from caster_gym.paths.trailing import trailing_directions, trailing_on
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
@@ -97,7 +97,7 @@ def motion_at(rows: Array, psi: Plane) -> Motion:
     )
 
 
-def sampled(trajectories: Sequence[Trajectory], robot: Robot) -> Iterator[Block]:
+def sample_paths(trajectories: Sequence[Trajectory], robot: Robot) -> Iterator[Block]:
     """All samples of trajectories, casters trailing, in blocks whose arrays stay in the processor's cache."""
     first = 0
     for (steps, time_step), group in groupby(trajectories, key=lambda t: (len(t.samples) - 1, t.time_step)):
@@ -175,7 +175,7 @@ def moments_within(spans: Spans, best: Array, measure: Measure, robot: Robot) ->
         )
 
 
-def joined(spans: list[Spans]) -> Spans:
+def join_spans(spans: list[Spans]) -> Spans:
     """All spans of several sets."""
     parts = list(zip(*spans, strict=True))
     return Spans(*map(np.concatenate, parts[:9]), *(np.concatenate(values, axis=1) for values in parts[9:]))
@@ -234,7 +234,7 @@ def _rows(spans: Spans, share: Array) -> Array:
         (np.stack([row[:, 0], row[:, 1], angle], axis=1), row[:, 4:7], row[:, 7:])
         for row, angle in ((spans.start, 0.0 * turn), (spans.end, turn))
     )
-    place, rate, acceleration = in_between(start, end, spans.step[:, None], share[..., None], spans.room)
+    place, rate, acceleration = motion_between(start, end, spans.step[:, None], share[..., None], spans.room)
     heading = heading * np.exp(1j * place[..., 2])
     turned = np.stack([heading.real, heading.imag], axis=-1)
     return np.concatenate([place[..., :2], turned, rate, acceleration], axis=-1)

@@ -112,7 +112,7 @@ class RandomPaths(Frozen):
         a, b, c = (np.where(kind == kinds.index("tangent"), t, o) for t, o in zip(along, own, strict=True))
         return a, b, c
 
-    def eased(self, factor: float) -> Self:
+    def ease(self, factor: float) -> Self:
         """The same paths under limits divided by a factor above 1, kept to two digits, rounded down."""
         names = ("max_speed", "max_acceleration", "max_yaw_rate")
         return self.model_copy(update={name: rounded_down(getattr(self, name) / factor) for name in names})
@@ -121,7 +121,7 @@ class RandomPaths(Frozen):
         """The same paths, along which the heading does not turn."""
         return self.model_copy(update={"heading": "fixed"})
 
-    def wider(self) -> Iterator[tuple[Self, str]]:
+    def widen(self) -> Iterator[tuple[Self, str]]:
         """Paths that turn less sharply, and what they take, in words."""
         for radius in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0):
             if radius > (self.min_radius or 0.0):

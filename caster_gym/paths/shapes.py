@@ -69,7 +69,7 @@ class Shape(Frozen):
         """What was made of the specification, as far as that does not stand in it."""
         return "; ".join([self.shape, *self.heading.notes])
 
-    def eased(self, factor: float) -> Self:
+    def ease(self, factor: float) -> Self:
         """The same path, walked slower by a factor above 1; its duration keeps three digits, rounded up."""
         return self.model_copy(update={"duration": rounded_up(self.duration * factor)})
 
@@ -77,7 +77,7 @@ class Shape(Frozen):
         """The same path, along which the heading does not turn; None where its headings are its own."""
         return self.model_copy(update={"heading": Fixed()})
 
-    def wider(self) -> Iterator[tuple[Self, str]]:
+    def widen(self) -> Iterator[tuple[Self, str]]:
         """The same path in larger sizes, and what each takes, in words."""
         now = max(np.max(getattr(self, name)) for name in self._sizes)
         for size in SIZES:
@@ -170,11 +170,11 @@ class RoundedSquare(Shape):
             )
         return self
 
-    def wider(self) -> Iterator[tuple[Self, str]]:
+    def widen(self) -> Iterator[tuple[Self, str]]:
         for size in SIZES:
             if self.rounding < size <= 0.5 * self.side:
                 yield self.model_copy(update={"rounding": size}), f"rounding {size:g} m"
-        yield from super().wider()
+        yield from super().widen()
 
     def curve(self, u: Array) -> Slopes:
         half = 0.5 * self.side - self.rounding

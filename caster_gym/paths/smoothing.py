@@ -28,7 +28,9 @@ _LONGER = 1.02  # [-] of that way: a curve as long as that swings out between sp
 _FINE = 8  # samples for each piece, from which an arc length is summed
 
 
-def smoothed(values: Array, at: Array, weights: Array, tolerance: float, closed: bool, most: float = np.inf) -> Any:
+def fit_smoothing_spline(
+    values: Array, at: Array, weights: Array, tolerance: float, closed: bool, most: float = np.inf
+) -> Any:
     """The spline beside values (n, d) at ascending places (n,) 0 … 1 with weights (n,), in the units of the tolerance.
 
     most: greatest distance from any value. closed: periodic, the last value being the first again.
@@ -111,7 +113,9 @@ def _derivative(knots: Array) -> Any:
     return sparse.csr_matrix(sparse.diags(np.sqrt(ways / (left + 1))) @ matrix)
 
 
-def smoothed_curve(points: Array, weights: Array, tolerance: float, closed: bool, most: float) -> tuple[Any, Array]:
+def fit_smoothing_curve(
+    points: Array, weights: Array, tolerance: float, closed: bool, most: float
+) -> tuple[Any, Array]:
     """The spline beside points (n, 2), walked at an even pace over 0 … 1, and the places (n,) of the points on it.
 
     None instead of the spline where there is none so near to the points: noise that is larger than the tolerance leaves
@@ -120,7 +124,7 @@ def smoothed_curve(points: Array, weights: Array, tolerance: float, closed: bool
     chords = np.hypot(*np.diff(points, axis=0).T)
     by_chords = at = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
     for fits in range(_PASSES + 1):
-        spline = smoothed(points, at, weights, tolerance, closed, most)
+        spline = fit_smoothing_spline(points, at, weights, tolerance, closed, most)
         fine = np.linspace(0.0, 1.0, _FINE * len(spline.c) + 1)
         pace = np.hypot(*spline(fine, 1).T)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]) * np.diff(fine))])

@@ -13,13 +13,13 @@ from pydantic import Field
 
 from caster_gym.configuration import LONGEST_VALUE, ConfigurationError, is_yaml, parse, read_yaml
 from caster_gym.paths.advice import timed_remedy
-from caster_gym.paths.angles import plain
+from caster_gym.paths.angles import plain_lists
 from caster_gym.paths.feasibility import check_feasible
 from caster_gym.paths.naming import unknown_name
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse, Lemniscate, RoundedSquare
 from caster_gym.paths.splines import Spline
-from caster_gym.paths.timed import Timed, timed_from
+from caster_gym.paths.timed import Timed, timed_path
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot
 
@@ -50,12 +50,12 @@ def read_paths(path: PathLike) -> tuple[AnyPath, ...]:
     if isinstance(path, get_args(AnyPath)):
         return (path,)
     if isinstance(path, Trajectory):
-        return (timed_from(path),)
+        return (timed_path(path),)
     if isinstance(path, str | Path):
         return (_named(path),)
     if isinstance(path, Mapping):
         return (_read(path, "path"),)
-    points = plain(path)
+    points = plain_lists(path)
     if isinstance(points, list):
         size = _size_of_points(points)
         if size is not None:
@@ -134,11 +134,11 @@ def build_trajectories(path: PathLike, robot: Robot, time_step: float) -> tuple[
             raise ValueError(f"path {specification.shape!r}: {error}{advice}") from error
         check_feasible(specification, trajectories, robot)
         built.extend(trajectories)
-    names = named_apart([one.name for one in built])
+    names = distinct_names([one.name for one in built])
     return tuple(one if one.name == name else replace(one, name=name) for one, name in zip(built, names, strict=True))
 
 
-def named_apart(names: Sequence[str]) -> list[str]:
+def distinct_names(names: Sequence[str]) -> list[str]:
     """The names, with a number behind those that were there before."""
     seen: Counter[str] = Counter()
     apart = []

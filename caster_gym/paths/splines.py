@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
 
 from caster_gym.arrays import Array
-from caster_gym.paths.angles import AngleUnit, ZeroAxis, plain, read_angles
+from caster_gym.paths.angles import AngleUnit, ZeroAxis, plain_lists, read_angles
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.shapes import SIZES, Shape
 from caster_gym.paths.trajectory import LEAST_STEPS, Trajectory, rounded_down, whole_steps
@@ -60,7 +60,7 @@ class Spline(Shape):
             from caster_gym.paths.files import read_waypoints  # late: most paths have no file
 
             return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest, "file": str(file)}
-        waypoints = plain(content.get("waypoints"))
+        waypoints = plain_lists(content.get("waypoints"))
         if not isinstance(waypoints, list) or not all(isinstance(one, list) and len(one) == 3 for one in waypoints):
             return content if waypoints is None else {**content, "waypoints": waypoints}
         angles, kept = read_angles([one[2] for one in waypoints], content.get("unit"), "a heading")
@@ -163,7 +163,7 @@ class Spline(Shape):
     def with_fixed_heading(self) -> Self | None:
         return None if self._has_headings else super().with_fixed_heading()
 
-    def wider(self) -> Iterator[tuple[Self, str]]:
+    def widen(self) -> Iterator[tuple[Self, str]]:
         x, y, *_ = zip(*self.waypoints, strict=True)
         most = max(max(x) - min(x), max(y) - min(y)) / _LEAST_SIZE
         for tolerance in SIZES:

@@ -9,8 +9,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from caster_gym.arrays import Array
 from caster_gym.configuration import Frozen
-from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain, read_angles, unwrapped
-from caster_gym.paths.in_between import in_between, room_for
+from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain_lists, read_angles, unwrapped
+from caster_gym.paths.in_between import motion_between, room_for
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import (
     LEAST_STEPS,
@@ -63,7 +63,7 @@ class Timed(Frozen):
             found = read_poses(Path(str(content["file"])), content.get("unit"), content.get("zero_axis"))
             rest = {key: value for key, value in content.items() if key != "unit"}
             return {**rest, **found, "file": str(content["file"])}
-        poses = plain(content.get("poses"))
+        poses = plain_lists(content.get("poses"))
         if not isinstance(poses, list) or not all(isinstance(pose, list) and len(pose) == 4 for pose in poses):
             return {**content, "poses": poses} if poses is not None else content
         angles, unit = read_angles([pose[3] for pose in poses], content.get("unit"), "a heading")
@@ -195,11 +195,11 @@ class Timed(Frozen):
             return None
         return self.model_copy(update={"poses": tuple((*pose[:3], 0.0) for pose in self.poses)})
 
-    def wider(self) -> Iterator[tuple[Self, str]]:
+    def widen(self) -> Iterator[tuple[Self, str]]:
         """None: poses are where they are."""
         yield from ()
 
-    def eased(self, factor: float) -> Self:
+    def ease(self, factor: float) -> Self:
         """The same poses, later by a factor above 1; the stretch keeps three digits, rounded up."""
         return self.model_copy(update={"stretch": rounded_up(self.stretch * factor)})
 
@@ -209,7 +209,7 @@ class Timed(Frozen):
         return f"a stretch of at least {self.stretch:g}"
 
 
-def timed_from(trajectory: Trajectory) -> Timed:
+def timed_path(trajectory: Trajectory) -> Timed:
     """The path that gives a trajectory again, sample by sample, and a smooth motion between its samples."""
     t = trajectory.samples
     heading = np.unwrap(np.arctan2(t[:, 3], t[:, 2]))
@@ -232,7 +232,7 @@ def _hermite(at: Array, values: Array, rates: Array, times: Array) -> Array:
     k = np.clip(np.searchsorted(at, times + 1e-9 * at[-1], side="right") - 1, 0, len(at) - 2)
     h, share = at[k + 1] - at[k], np.clip((times - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0)
     start, end = ((values[i], rates[i, :3], rates[i, 3:]) for i in (k, k + 1))
-    return np.stack(in_between(start, end, h[:, None], share[:, None], _room(at, rates[:, 3:])[k]))
+    return np.stack(motion_between(start, end, h[:, None], share[:, None], _room(at, rates[:, 3:])[k]))
 
 
 def _room(at: Array, acceleration: Array) -> Array:

@@ -73,7 +73,7 @@ def directions_at_rows(point: Plane, heading: Plane, robot: Robot) -> Plane:
     return np.moveaxis(np.concatenate([psi, _moved(psi[-1:], a[-1:], b[-1:])]), -1, 0)
 
 
-def steered(direction: Pair, way: Pair, change: Pair, trails: Array) -> Pair:
+def steer(direction: Pair, way: Pair, change: Pair, trails: Array) -> Pair:
     """Rolling directions after ways (..., N) of the pivots [m], all in one frame; V changes by `change` over the time.
 
     In real numbers: rounding then does not depend on the place in an array, as that of NumPy's complex ones does.

@@ -30,20 +30,22 @@ class Walk:
         self._smooth_headings: Any = None
         self._stations = lengths / self.way if self.way > 0.0 else turned / max(self.turning, 1e-300)
         if self.way > 0.0 and tolerance > 0.0 and len(leg.points) > 2:
-            from caster_gym.paths.smoothing import smoothed_curve  # SciPy takes a while to import
+            from caster_gym.paths.smoothing import fit_smoothing_curve  # SciPy takes a while to import
 
             # a mean of many waypoints errs less than each of them; not by the root of their number, as they are related
             error = tolerance * float(min(1.0, _MEANS_ERR * len(leg.weights) / leg.weights.sum())) ** 0.5
-            self._smooth, self._stations = smoothed_curve(leg.points, leg.weights, error, leg.closed, most)
+            self._smooth, self._stations = fit_smoothing_curve(leg.points, leg.weights, error, leg.closed, most)
         apart = np.concatenate([[True], np.diff(self._stations) > 0.0])
         self._at, self._angles = self._stations[apart], angles[apart]
         self._whole = self._angles[-1] - self._angles[0] if leg.closed else 0.0  # [rad] a lap, spread evenly
         self._rest = self._angles - self._whole * self._at  # periodic if the leg is closed
         if self.turning > 0.0 and heading_tolerance > 0.0 and len(self._at) > 2:
-            from caster_gym.paths.smoothing import smoothed  # SciPy takes a while to import
+            from caster_gym.paths.smoothing import fit_smoothing_spline  # SciPy takes a while to import
 
             weights = leg.weights[apart]
-            self._smooth_headings = smoothed(self._rest[:, None], self._at, weights, heading_tolerance, leg.closed)
+            self._smooth_headings = fit_smoothing_spline(
+                self._rest[:, None], self._at, weights, heading_tolerance, leg.closed
+            )
 
     def curve(self, u: Array) -> Slopes:
         """p [m] and its first three derivatives at u; a closed leg goes on after 1."""

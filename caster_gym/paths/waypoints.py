@@ -56,7 +56,7 @@ def read_track(
     rows = np.array(waypoints, dtype=np.float64)
     notes: list[str] = []
     if rows.shape[1] == 3:
-        rows[:, 2], note = continued(rows[:, 2], turns)
+        rows[:, 2], note = continue_headings(rows[:, 2], turns)
         notes += [note] if note else []
     lap_turn = 0.0
     if closed and np.ptp(rows[:, :2], axis=0).max() >= SAME_PLACE:
@@ -82,7 +82,7 @@ def read_track(
     return Track(legs, allowed, turn_allowed, tolerance is None, tuple(notes))
 
 
-def continued(headings: Array, turns: Turns) -> tuple[Array, str]:
+def continue_headings(headings: Array, turns: Turns) -> tuple[Array, str]:
     """Headings [rad] counted on from the first, and what was decided about them.
 
     auto: as they were written if some is beyond half a turn, unless they only jump where a turn from 0 to 2π ends;

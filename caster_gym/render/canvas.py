@@ -99,7 +99,7 @@ class Canvas:
 
     def line(self, points: ArrayLike, width: float, colour: Colour, opacity: float = 1.0) -> None:
         """A line through points (n, 2) with round corners and flat ends; of dense points it leaves some out."""
-        track = thinned(np.asarray(points, dtype=np.float64), PIECE)
+        track = thin_out(np.asarray(points, dtype=np.float64), PIECE)
         if len(track) < 2 or not np.isfinite(track).all():
             return
         low, high = (track.min(axis=0) - width) * SAMPLES, (track.max(axis=0) + width) * SAMPLES
@@ -175,7 +175,7 @@ def _stroke(on: pygame.Surface, track: Array, corner: Array, width: float, colou
         pygame.draw.circle(on, colour, joint, half)
 
 
-def thinned(points: Array, spacing: float) -> Array:
+def thin_out(points: Array, spacing: float) -> Array:
     """Points (n, 2) of a line without those that follow another more closely than about a spacing; ends stay."""
     if len(points) < 3:
         return points

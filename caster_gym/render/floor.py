@@ -8,7 +8,7 @@ from caster_gym.arrays import Array
 from caster_gym.envs.scene import Scene
 from caster_gym.mechanics.separation import Obstacles
 from caster_gym.render import palette
-from caster_gym.render.canvas import Canvas, thinned
+from caster_gym.render.canvas import Canvas, thin_out
 from caster_gym.render.view import Area, View, round_length
 
 BACKING = 0.75  # opacity of the paper behind letters
@@ -43,7 +43,7 @@ def draw_scale(canvas: Canvas, view: View, unit: float) -> None:
     length = round_length(0.22 * view.area.width / view.scale)
     x, y = view.area.left + 16.0 * unit, view.area.top + view.area.height - 16.0 * unit
     end = x + length * view.scale
-    canvas.rectangle(Area(x, y - 15.0 * unit, end - x, 15.0 * unit).within(-8.0 * unit), palette.PAPER, BACKING)
+    canvas.rectangle(Area(x, y - 15.0 * unit, end - x, 15.0 * unit).inset(-8.0 * unit), palette.PAPER, BACKING)
     canvas.line([(x, y - 4.0 * unit), (x, y), (end, y), (end, y - 4.0 * unit)], 1.4 * unit, palette.INK)
     canvas.text(f"{length:g} m", ((x + end) / 2.0, y - 5.0 * unit), 17.0 * unit, palette.INK, 0.5, 1.0)
 
@@ -52,7 +52,7 @@ def draw_legend(canvas: Canvas, view: View, unit: float) -> None:
     """What the lines are, in the lower right corner."""
     right, y = view.area.left + view.area.width - 16.0 * unit, view.area.top + view.area.height - 16.0 * unit
     x = right - LEGEND * unit
-    canvas.rectangle(Area(x, y - 15.0 * unit, right - x, 15.0 * unit).within(-8.0 * unit), palette.PAPER, BACKING)
+    canvas.rectangle(Area(x, y - 15.0 * unit, right - x, 15.0 * unit).inset(-8.0 * unit), palette.PAPER, BACKING)
     y -= 6.0 * unit
     for name, width, colour in (("path", 1.6, palette.PATH), ("driven", 2.2, palette.TRACE)):
         canvas.line([(x, y), (x + 20.0 * unit, y)], width * unit, colour)
@@ -63,7 +63,7 @@ def draw_legend(canvas: Canvas, view: View, unit: float) -> None:
 def _draw_corridor(canvas: Canvas, view: View, scene: Scene, unit: float) -> None:
     """The points nearer to the path than the corridor's half width."""
     width = scene.corridor * view.scale
-    track = thinned(view.pixels(scene.path), max(1.0, 0.05 * width))
+    track = thin_out(view.pixels(scene.path), max(1.0, 0.05 * width))
     for radius, colour in ((width + unit, palette.CORRIDOR_EDGE), (width, palette.CORRIDOR)):
         canvas.line(track, 2.0 * radius, colour)
         for point in track:
@@ -85,7 +85,7 @@ def draw_obstacles(canvas: Canvas, view: View, obstacles: Obstacles, unit: float
     """Half-planes hatched behind their edge; pillars, walls and polygons filled."""
     half_planes = np.array([obstacles.faces[face] for face, _, first, end in obstacles.spans if first == end])
     for face in half_planes:
-        frame = view.metres(view.area.within(-8.0 * unit).corners)
+        frame = view.metres(view.area.inset(-8.0 * unit).corners)
         canvas.polygon(view.pixels(_behind(frame, face[:2], float(face[2]))), palette.SOLID)
     for i, face in enumerate(half_planes):
         _draw_edge(canvas, view, face, np.delete(half_planes, i, axis=0), unit)

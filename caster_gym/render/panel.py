@@ -11,7 +11,7 @@ from caster_gym.render.canvas import Canvas
 from caster_gym.render.drawing import draw_motion, force_scale
 from caster_gym.render.floor import BACKING, draw_obstacles, draw_patches
 from caster_gym.render.history import History
-from caster_gym.render.view import Area, around, round_length
+from caster_gym.render.view import Area, round_length, view_around
 
 SPAN = 10.0  # [s] of the chart of errors
 LOWEST, HIGHEST = -4, 0  # powers of ten [m] at the ends of its axis
@@ -25,7 +25,7 @@ def draw_panel(canvas: Canvas, area: Area, scene: Scene, history: History, unit:
     canvas.clip(None)
     edge = area.left
     canvas.line([(edge, area.top), (edge, area.top + area.height)], 1.5 * unit, palette.RULE)
-    inner = area.within(18.0 * unit)
+    inner = area.inset(18.0 * unit)
     side = min(inner.width, 0.47 * area.height)
     gap, top = 12.0 * unit, inner.top + 26.0 * unit
     canvas.text(scene.robot.name, (inner.left, inner.top + 6.0 * unit), 24.0 * unit, palette.INK)
@@ -39,7 +39,7 @@ def draw_panel(canvas: Canvas, area: Area, scene: Scene, history: History, unit:
 
 def draw_close_up(canvas: Canvas, area: Area, scene: Scene, history: History, unit: float) -> None:
     """The robot large enough to see its casters and the forces on its wheels."""
-    view = around(scene.pose[:2], CLOSE * scene.robot.reach, area)
+    view = view_around(scene.pose[:2], CLOSE * scene.robot.reach, area)
     canvas.clip(area)
     canvas.fill(palette.GROUND)
     draw_patches(canvas, view, scene, unit)
@@ -51,7 +51,7 @@ def draw_close_up(canvas: Canvas, area: Area, scene: Scene, history: History, un
     scale = force_scale(scene.robot) * view.scale
     force = round_length(0.22 * area.width / scale)
     x, y = area.left + 10.0 * unit, area.top + area.height - 13.0 * unit
-    backing = Area(x, y, force * scale + 38.0 * unit, 0.0).within(-9.0 * unit)
+    backing = Area(x, y, force * scale + 38.0 * unit, 0.0).inset(-9.0 * unit)
     canvas.rectangle(backing, palette.PAPER, BACKING)
     canvas.arrow((x, y), (x + force * scale, y), 2.6 * unit, palette.FORCE)
     canvas.text(f"{force:g} N", (x + force * scale + 6.0 * unit, y), 17.0 * unit, palette.FORCE)

@@ -37,7 +37,7 @@ class Area(NamedTuple):
         right, bottom = self.left + self.width, self.top + self.height
         return np.array([(self.left, self.top), (right, self.top), (right, bottom), (self.left, bottom)])
 
-    def within(self, margin: float) -> "Area":
+    def inset(self, margin: float) -> "Area":
         """The same without a margin on each side, as long as something is left of it."""
         dx, dy = min(margin, 0.45 * self.width), min(margin, 0.45 * self.height)
         return Area(self.left + dx, self.top + dy, self.width - 2.0 * dx, self.height - 2.0 * dy)
@@ -62,12 +62,12 @@ class View:
         column, row = self.area.centre
         return (np.asarray(pixels, dtype=np.float64) - (column, row)) / (self.scale, -self.scale) + (self.x, self.y)
 
-    def shown_in(self, area: Area) -> "View":
+    def in_area(self, area: Area) -> "View":
         """The same place and scale in another area."""
         return View(area, self.x, self.y, self.scale)
 
 
-def fitted(low: ArrayLike, high: ArrayLike, area: Area) -> View:
+def fit_view(low: ArrayLike, high: ArrayLike, area: Area) -> View:
     """The view that shows the world between two corners as large as the area allows."""
     first, last = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     size = np.maximum(last - first, 1e-6)
@@ -76,10 +76,10 @@ def fitted(low: ArrayLike, high: ArrayLike, area: Area) -> View:
     return View(area, float(x), float(y), scale)
 
 
-def around(centre: ArrayLike, across: float, area: Area) -> View:
+def view_around(centre: ArrayLike, across: float, area: Area) -> View:
     """The view that shows `across` metres around a world point along the area's shorter side."""
     middle = np.asarray(centre, dtype=np.float64)
-    return fitted(middle - 0.5 * across, middle + 0.5 * across, area)
+    return fit_view(middle - 0.5 * across, middle + 0.5 * across, area)
 
 
 def extent(scene: Scene) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from caster_gym.render.floor import draw_floor, draw_legend, draw_scale
 from caster_gym.render.history import History
 from caster_gym.render.panel import draw_panel, status
 from caster_gym.render.pygame_loader import pygame
-from caster_gym.render.view import Area, View, around, extent, fitted, grid
+from caster_gym.render.view import Area, View, extent, fit_view, grid, view_around
 
 SIZE = (960, 640)  # [px]
 UNIT = 640.0  # [px] frame height for which letters and lines are designed
@@ -133,7 +133,7 @@ class Viewer:
         gap = 0.0 if count == 1 else 1.5 * min(width, height) / UNIT
         unit = max(min(cells[0].width, cells[0].height) / UNIT, 0.6 * min(1.0, min(self.size) / UNIT))
         names = ["" if count == 1 else f"robot {i}" for i in range(count)]
-        self._cells = [_Cell(area.within(gap), None, unit, name) for area, name in zip(cells, names, strict=True)]
+        self._cells = [_Cell(area.inset(gap), None, unit, name) for area, name in zip(cells, names, strict=True)]
 
     def _show_in_window(self, picture: pygame.Surface) -> None:
         # any other environment may have quit pygame since, which closes all windows
@@ -170,9 +170,9 @@ class _Floor:
         if follow is None and cell.area in self._shown and same_floor(scene, self._shown[cell.area][0]):
             return self._shown[cell.area][1]
         if follow is not None:
-            view = around(scene.pose[:2], follow, cell.area)
+            view = view_around(scene.pose[:2], follow, cell.area)
         else:
-            view = fitted(*extent(scene), cell.area.within(14.0 * cell.unit)).shown_in(cell.area)
+            view = fit_view(*extent(scene), cell.area.inset(14.0 * cell.unit)).in_area(cell.area)
         draw_floor(self.canvas, view, scene, cell.unit)
         draw_scale(self.canvas, view, cell.unit)
         if cell.panel is not None:

@@ -21,7 +21,7 @@ from caster_gym.arrays import Array
 from caster_gym.control.torque_distribution import distribute
 from caster_gym.control.wrench_limits import reach_of
 from caster_gym.mechanics.motors import torque_range
-from caster_gym.paths.trailing import steered
+from caster_gym.paths.trailing import steer
 from caster_gym.wrappers.feature import Actions, Place, Quantities
 from caster_gym.wrappers.inner_loop import InnerLoop
 
@@ -105,7 +105,7 @@ class TwistLoop(InnerLoop):
         (x, y), (later_x, later_y) = self._pivot_velocities(self._twist), self._pivot_velocities(twist)
         end_x, end_y = cos * later_x - sin * later_y, sin * later_x + cos * later_y  # in the axes of B at the start
         way, change = (0.5 * time * (x + end_x), 0.5 * time * (y + end_y)), (time * (end_x - x), time * (end_y - y))
-        c, s = steered((np.cos(self._steering), np.sin(self._steering)), way, change, self._trails)
+        c, s = steer((np.cos(self._steering), np.sin(self._steering)), way, change, self._trails)
         return np.arctan2(s, c) - turn
 
     def _pivot_velocities(self, twist: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.analysis.checked import finite
-from caster_gym.analysis.frames import turned
+from caster_gym.analysis.frames import turn_planar
 from caster_gym.arrays import Array
 from caster_gym.engines.time_step import check_time_step
 from caster_gym.robot import Robot
@@ -151,7 +151,7 @@ def _stepped(complement: OrthogonalComplement, y: Array, torque: Array, h: float
 
     def derivative(_: float, y: Array) -> Array:
         motion = complement.motion(y[6:], y[3:6], torque)
-        return np.concatenate((turned(motion.twist, np.exp(1j * y[2])), motion.accelerations, motion.rates[2::3]))
+        return np.concatenate((turn_planar(motion.twist, np.exp(1j * y[2])), motion.accelerations, motion.rates[2::3]))
 
     solver = RK45(derivative, 0.0, y, h, first_step=h, atol=np.inf)  # no error is too great: the step stays
     with np.errstate(over="ignore", invalid="ignore"):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from caster_gym.analysis.checked import finite
-from caster_gym.analysis.frames import motion_in_body, turned
+from caster_gym.analysis.frames import motion_in_body, turn_planar
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
 from caster_gym.paths.trajectory import Trajectory
@@ -32,7 +32,7 @@ class DrivenMotion:
 
     def in_world(self, force: Array) -> Array:
         """Forces (K + 1, 3) at C with components in W instead of B."""
-        return turned(force, np.exp(1j * self.pose[:, 2]))
+        return turn_planar(force, np.exp(1j * self.pose[:, 2]))
 
 
 def steady_steering(robot: Robot, twist: ArrayLike) -> Array:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.analysis.frames import turned
+from caster_gym.analysis.frames import turn_planar
 from caster_gym.arrays import Array
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
@@ -235,7 +235,7 @@ def _loop(robot: Robot, first: int, second: int, size: float, steps: int = 30) -
         for _ in range(steps):
             midway = np.full(robot.caster_count, delta + 0.5 * change[DELTA])
             way = forward_jacobian(robot, midway)[0] @ change
-            pose = pose + turned(way, np.exp(1j * (pose[2] + 0.5 * way[2])))
+            pose = pose + turn_planar(way, np.exp(1j * (pose[2] + 0.5 * way[2])))
             delta += change[DELTA]
             poses.append(pose)
     return np.array(poses)

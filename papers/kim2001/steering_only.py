@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from caster_gym.analysis.frames import turned
+from caster_gym.analysis.frames import turn_planar
 from caster_gym.arrays import Array
 from caster_gym.design.singular_lines import smallest_singular_value
 from caster_gym.engines.numpy_model import Model
@@ -37,7 +37,7 @@ def one_round() -> tuple[Array, float]:
     ways = np.linalg.solve(model.jacobian(halfway, JOINTS), np.diff(steering, axis=0)[..., None])[..., 0]
     pose = np.zeros(3)
     for way in ways:
-        pose = pose + turned(way, np.exp(1j * (pose[2] + 0.5 * way[2])))
+        pose = pose + turn_planar(way, np.exp(1j * (pose[2] + 0.5 * way[2])))
     return pose, float(smallest_singular_value(ROBOT, steering, JOINTS).min())
 
 

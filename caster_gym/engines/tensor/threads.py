@@ -16,7 +16,7 @@ DEFAULT = 1
 
 
 @contextmanager
-def limited_to(threads: int) -> Iterator[None]:
+def limit_threads(threads: int) -> Iterator[None]:
     """Torch and the simulator take so many threads at most inside, and as many as before afterwards."""
     if threads < 1:
         raise ValueError(f"the number of threads must be 1 or more, got {threads}")
