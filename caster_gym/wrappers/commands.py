@@ -19,6 +19,13 @@ class ResidualTorque(Feature):
     """Actions correct those of another agent: what is done is clip(agent's action + share · action).
 
     The agent is any object with `act(observations) -> actions`, both (robots, …), that remembers nothing.
+
+    >>> import caster_gym, gymnasium
+    >>> from caster_gym.wrappers import ResidualTorque, wrap
+    >>> layout = caster_gym.ObservationLayout(caster_gym.load_robot("chung2008"), preview=(0.1, 0.2, 0.4))
+    >>> controller = caster_gym.ComputedTorque(layout, natural_frequency=30.0, period=0.02)
+    >>> env = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(env, ResidualTorque(agent=controller, share=0.1))  # an action of 0 is computed torque alone
     """
 
     kind: Literal["residual_torque"] = "residual_torque"
@@ -49,6 +56,13 @@ class TwistCommands(Feature):
     With the robot's model at hand, what is left to a wanted twist falls as exp(−bandwidth · t) while no motor is at its
     limit. A twist that the motors cannot hold is reduced as a whole, to the greatest multiple that they can hold; the
     way towards it likewise.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import TwistCommands, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), TwistCommands(max_speed=0.5))
+    >>> observation, info = env.reset(seed=0)
+    >>> env.action_space.shape  # vx, vy, ω instead of six torques
+    (3,)
     """
 
     kind: Literal["twist_commands"] = "twist_commands"
@@ -71,6 +85,13 @@ class JointSpeeds(Feature):
     S_ij = w_iᵀ M⁻¹ w_j √(m_i m_j), w the motors' wrenches per torque. As ‖S‖ (Frobenius) is no less than the greatest
     eigenvalue of S, no motion closes faster on its target than exp(−bandwidth · t), and none overshoots, however long
     the control period T is: it holds what happens in it apart from the turning of the casters.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import JointSpeeds, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), JointSpeeds())
+    >>> observation, info = env.reset(seed=0)
+    >>> env.action_space.shape  # one speed for each driven motor
+    (6,)
     """
 
     kind: Literal["joint_speeds"] = "joint_speeds"

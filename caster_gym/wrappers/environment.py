@@ -143,6 +143,13 @@ def wrap(env: Env | Batch, *features: Feature) -> FeatureEnv | FeatureVectorEnv:
     The first feature is nearest to the environment: observations pass it first, actions last. Rewards are the task's
     plus the terms that features add, in their order; info["reward_terms"] holds them all by name and
     info["task_reward"] what the task alone gave. Raises ValueError for environments and features that do not fit.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Effort, Payload, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), Payload(mass=(0, 2)), Effort())
+    >>> observation, info = env.reset(seed=0)
+    >>> "extra_effort" in info["reward_terms"], info["task_reward"]
+    (True, 0.0)
     """
     if isinstance(env, VectorEnv):
         return FeatureVectorEnv(env, features)

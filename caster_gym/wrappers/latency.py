@@ -20,7 +20,16 @@ def _rising(value: int | tuple[int, int]) -> int | tuple[int, int]:
 
 
 class ActionDelay(Feature):
-    """Actions arrive late, by whole control periods; until the first one arrives, they are zero."""
+    """Actions arrive late, by whole control periods; until the first one arrives, they are zero.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import ActionDelay, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), ActionDelay(periods=1))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> info["torque"].round(3)  # [N m]
+    array([0., 0., 0., 0., 0., 0.])
+    """
 
     kind: Literal["action_delay"] = "action_delay"
     periods: Annotated[Periods | tuple[Periods, Periods], AfterValidator(_rising)] = 1  # [control periods] by episode
@@ -34,6 +43,14 @@ class MotorLag(Feature):
     """Actions are followed as by a first-order lag: what remains to be done falls as exp(−t / time constant).
 
     Over each control period the mean of what follows is held, so that a motor's impulse is the right one.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import MotorLag, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), MotorLag(time_constant=0.02))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> info["torque"].round(3)  # [N m]
+    array([0.074, 0.037, 0.074, 0.037, 0.074, 0.037])
     """
 
     kind: Literal["motor_lag"] = "motor_lag"

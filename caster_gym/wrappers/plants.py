@@ -36,7 +36,13 @@ from caster_gym.wrappers.feature import (
 
 
 class Payload(Feature):
-    """A load that is fixed to the platform."""
+    """A load that is fixed to the platform.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Payload, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), Payload(mass=(0.0, 2.0), x=0.05))
+    >>> observation, info = env.reset(seed=0)
+    """
 
     kind: Literal["payload"] = "payload"
     mass: Size = 1.0  # [kg]
@@ -61,7 +67,14 @@ OfAFloor: TypeAlias = Annotated[Range, AfterValidator(_of_a_floor)]
 
 
 class Friction(Feature):
-    """Other friction in each joint, drawn joint by joint, and another floor."""
+    """Other friction in each joint, drawn joint by joint, and another floor.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Friction, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, Friction(added_coulomb=(0.0, 0.01)))
+    >>> observation, info = env.reset(seed=0)
+    """
 
     usual_names: ClassVar[Mapping[str, str]] = {"friction": "floor_friction", "mu": "floor_friction"}
 
@@ -83,7 +96,14 @@ class Friction(Feature):
 
 
 class WheelErrors(Feature):
-    """Casters whose trails and wheels differ from the description, drawn caster by caster."""
+    """Casters whose trails and wheels differ from the description, drawn caster by caster.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import WheelErrors, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, WheelErrors(radius=(-0.001, 0.001)))
+    >>> observation, info = env.reset(seed=0)
+    """
 
     kind: Literal["wheel_errors"] = "wheel_errors"
     trail: Range = 0.0  # [m] true trail minus described one

@@ -16,6 +16,12 @@ class Pushes(Feature):
     """A force at C in any direction, with a moment, now and then; it turns with the robot while it lasts.
 
     The impulse of a push is its force times its duration. A push that begins during another one takes its place.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Pushes, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, Pushes(rate=1.0, force=(0.0, 5.0)))
+    >>> observation, info = env.reset(seed=0)
     """
 
     kind: Literal["pushes"] = "pushes"

@@ -63,6 +63,15 @@ class Potential(RewardShape):
 
     It leaves every optimal policy optimal if the discount γ is the learner's (Ng, Harada and Russell, ICML 1999). An
     episode that is cut off by time keeps the potential of its last state.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Potential, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, Potential(quantity="position_error", margin=0.5, discount=0.97))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> round(float(info["reward_terms"]["potential_position_error"]), 4)
+    -0.0278
     """
 
     kind: Literal["potential"] = "potential"
@@ -86,7 +95,17 @@ class Potential(RewardShape):
 
 
 class Tolerance(RewardShape):
-    """weight · shape of a quantity after the step."""
+    """weight · shape of a quantity after the step.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Tolerance, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, Tolerance(quantity="power", bounds=(None, 5.0)))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> round(float(info["reward_terms"]["tolerance_power"]), 4)
+    1.0
+    """
 
     kind: Literal["tolerance"] = "tolerance"
 
@@ -96,7 +115,16 @@ class Tolerance(RewardShape):
 
 
 class Effort(Feature):
-    """−weight · mean square of the motors' torques as shares of their greatest."""
+    """−weight · mean square of the motors' torques as shares of their greatest.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Effort, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), Effort(weight=0.05))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> round(float(info["reward_terms"]["extra_effort"]), 4)
+    -0.0492
+    """
 
     kind: Literal["effort"] = "effort"
     weight: NonNegativeFloat = 0.02
@@ -108,7 +136,16 @@ class Effort(Feature):
 
 
 class Smoothness(Feature):
-    """−weight · mean square of the change of the motors' torque shares since the step before; they start at zero."""
+    """−weight · mean square of the change of the motors' torque shares since the step before; they start at zero.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Smoothness, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), Smoothness(weight=0.1))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> round(float(info["reward_terms"]["smoothness"]), 4)
+    -0.0985
+    """
 
     kind: Literal["smoothness"] = "smoothness"
     weight: NonNegativeFloat = 0.05
@@ -120,7 +157,16 @@ class Smoothness(Feature):
 
 
 class TractionUse(Feature):
-    """−weight · (use of the floor's friction − threshold), none below the threshold, and never more than weight."""
+    """−weight · (use of the floor's friction − threshold), none below the threshold, and never more than weight.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import TractionUse, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), TractionUse(threshold=0.1))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> round(float(info["reward_terms"]["traction"]), 4)
+    -0.0492
+    """
 
     kind: Literal["traction_use"] = "traction_use"
     weight: NonNegativeFloat = 0.1
@@ -133,7 +179,16 @@ class TractionUse(Feature):
 
 
 class Impact(Feature):
-    """−weight · normal impulse of obstacles on the robot during the step."""
+    """−weight · normal impulse of obstacles on the robot during the step.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import Impact, wrap
+    >>> env = wrap(gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate"), Impact(weight=2.0))
+    >>> observation, info = env.reset(seed=0)
+    >>> info = env.step(env.action_space.high)[-1]
+    >>> bool(info["reward_terms"]["extra_impact"] == 0.0)  # nothing was touched
+    True
+    """
 
     kind: Literal["impact"] = "impact"
     weight: NonNegativeFloat = 1.0  # [1/(N s)]

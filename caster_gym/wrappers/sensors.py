@@ -19,7 +19,14 @@ from caster_gym.wrappers.feature import Feature, Observations, Place, Quantities
 
 
 class SensorNoise(Feature):
-    """Normal noise of every control period, and biases that stay for an episode; numbers are standard deviations."""
+    """Normal noise of every control period, and biases that stay for an episode; numbers are standard deviations.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import SensorNoise, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, SensorNoise(position=0.002, heading=0.005))
+    >>> observation, info = env.reset(seed=0)
+    """
 
     kind: Literal["sensor_noise"] = "sensor_noise"
     position: NonNegativeFloat = 0.0  # [m] of the measured place, along each axis
@@ -39,7 +46,14 @@ class SensorNoise(Feature):
 
 
 class SteeringOffset(Feature):
-    """Steering encoders that show every angle turned by a constant: known zeros, and what is drawn for each caster."""
+    """Steering encoders that show every angle turned by a constant: known zeros, and what is drawn for each caster.
+
+    >>> import gymnasium
+    >>> from caster_gym.wrappers import SteeringOffset, wrap
+    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
+    >>> env = wrap(inner, SteeringOffset(angle=(-0.02, 0.02)))
+    >>> observation, info = env.reset(seed=0)
+    """
 
     kind: Literal["steering_offset"] = "steering_offset"
     angle: Range = (-0.02, 0.02)  # [rad] shown minus true angle

@@ -44,6 +44,10 @@ def read_features(features: Sequence[str | Mapping[str, Any] | Feature]) -> tupl
     """Checked features from their kinds, from mappings with kind and fields, or from features, in their order.
 
     Raises ConfigurationError that names the feature, the key and the value.
+
+    >>> from caster_gym.wrappers import read_features
+    >>> [type(one).__name__ for one in read_features(["payload", {"kind": "action_delay", "periods": [0, 2]}])]
+    ['Payload', 'ActionDelay']
     """
     if isinstance(features, str | Mapping) or not isinstance(features, Sequence):
         raise ConfigurationError(f"features should be a list, got {features!r}")
