@@ -97,7 +97,7 @@ def rows(robots: Sequence[Robot]) -> list[Row]:
         row(
             "(D1), which chung2008 leaves out: accelerations off without it, median (95 % quantile)",
             "{:.2g} % ({:.2g} %)",
-            'taken in; `dynamics="chung2008"` leaves it out',
+            'always; `dynamics="chung2008"` leaves it out',
             *(off_without(robot, "off_axis") for robot in robots),
         ),
         row(
@@ -222,28 +222,28 @@ def step_error(robot: Robot) -> float:
 
 def page(found: list[Row], robots: Sequence[Robot], command: str) -> str:
     """The page as Markdown."""
-    heads = ["what", *(robot.name for robot in robots), "taken in by"]
+    heads = ["what", *(robot.name for robot in robots), "included by"]
     table = markdown_table(heads, [(one.what, *one.sizes, one.option) for one in found])
     return f"""# How true the model is
 
 The equations assume rigid bodies on a level floor, on which every wheel rolls without slip. Where that holds, they are
 exact: two independent derivations agree to rounding, and MuJoCo converges to them as its time step shrinks. This page
-says what they leave out, how large that is on each robot of the package, and what takes it in.
+says what the equations leave out, how large each effect is on each robot of the package, and which option includes it.
 
 {table}
 
-Numbers are of the robots' files, whose masses, heights and friction are partly estimates; a friction of the floor of
-{robots[0].floor_friction:g} everywhere. A use of friction above 1 says that the wheel would slip.
+The numbers follow from the robots' files, whose masses, heights and friction are partly estimates. The floor's friction
+is {robots[0].floor_friction:g} everywhere. A use of friction above 1 means that the wheel would slip.
 
-What has no number here, because no robot file could tell it: contact patches are points, whose resistance to turning is
-viscous (`scrub`); tyres, floor and gears are stiff and have no play; the floor is level; batteries do not sag; rotors
-have no spin that would tilt the robot. Sensors are exact unless [features](wrappers.md#sensors) say otherwise.
+Some assumptions have no number here, because no robot file contains what they depend on. Contact patches are points, and
+resist turning viscously (`scrub`). Tyres, floor and gears are stiff and have no play. The floor is level. Batteries keep
+their voltage. Spinning rotors do not tilt the robot. Sensors are exact unless [features](wrappers.md#sensors) change them.
 
-## Measured by somebody else's code
+## Compared with other people's code
 
-- [MuJoCo's motion](truth/mujoco.md): the limit of rolling without slip, and what dry friction does at rest.
-- [Impacts](truth/impacts.md): where the floor cannot hold them.
-- [Slip](truth/slip.md): the plant whose wheels may slip (`floor`), beside MuJoCo's wheels on the same floor.
+- [MuJoCo's motion](truth/mujoco.md): the limit of rolling without slip, and the effect of dry friction at rest.
+- [Impacts](truth/impacts.md): impacts that the floor cannot hold.
+- [Slip](truth/slip.md): wheels that may slip (`floor`), beside MuJoCo's wheels on the same floor.
 
 - Command: `{command}`
 - Versions: {versions_in_words("caster_gym", "numpy")}
