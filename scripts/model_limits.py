@@ -235,9 +235,10 @@ says what the equations leave out, how large each effect is on each robot of the
 The numbers follow from the robots' files, whose masses, heights and friction are partly estimates. The floor's friction
 is {robots[0].floor_friction:g} everywhere. A use of friction above 1 means that the wheel would slip.
 
-Some assumptions have no number here, because no robot file contains what they depend on. Contact patches are points, and
-resist turning viscously (`scrub`). Tyres, floor and gears are stiff and have no play. The floor is level. Batteries keep
-their voltage. Spinning rotors do not tilt the robot. Sensors are exact unless [features](wrappers.md#sensors) change them.
+Some assumptions have no number here, because no robot file contains what they depend on. Contact patches are points,
+which resist turning viscously (`scrub`). Tyres, floor and gears are stiff and have no play. The floor is level.
+Batteries keep their voltage. Spinning rotors do not tilt the robot. Sensors are exact unless
+[features](wrappers.md#sensors) change them.
 
 ## Compared with other people's code
 
