@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
-from caster_gym.design.singular_lines import action_lines, kind_and_caster, meeting
+from caster_gym.design.joint_sets import kind_and_caster
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.figures import COLOURS
 from caster_gym.robot import Robot
+from papers.analysis.action_lines import action_lines, meeting
 from papers.notation import in_letters
 from papers.robot_drawing import draw_robot
 

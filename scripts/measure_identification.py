@@ -17,9 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from caster_gym.arrays import Array
-from caster_gym.identification.fit import identify
-from caster_gym.identification.recording import Noise, Recording
-from caster_gym.identification.unknowns import robot_with
+from caster_gym.identification import Noise, Recording, identify, robot_with
 from caster_gym.report.tables import markdown_table
 from caster_gym.robot import Robot, load_robot
 from scripts.maximal_bodies import FrictionLaw, MaximalBodies

@@ -397,7 +397,7 @@ def test_a_missing_library_is_named_with_its_extra(call, monkeypatch):
     def missing(*_):
         raise ModuleNotFoundError("No module named 'torch'", name="torch")
 
-    monkeypatch.setattr("caster_gym.design.command.design", missing)
+    monkeypatch.setattr("caster_gym.design.design", missing)
     assert_refused(call("design"), "this needs the Python package 'torch': pip install 'caster_gym[train]'")
 
 

@@ -12,7 +12,7 @@ from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.identification.command import (
     PAYLOAD,
     features_yaml,
-    identify,
+    identify_file,
     in_words,
     number_words,
     page,
@@ -20,7 +20,7 @@ from caster_gym.identification.command import (
     write_example,
     write_identification,
 )
-from caster_gym.identification.fit import identify as estimate
+from caster_gym.identification.fit import identify
 from caster_gym.identification.recording import read_recording
 from caster_gym.identification.recording_check import ContradictionError
 from caster_gym.identification.unknowns import unknowns
@@ -56,25 +56,25 @@ def settings():
 @pytest.fixture(scope="module")
 def found(short, settings):
     robot = load_robot("chung2008")
-    return estimate(robot, read_recording(short, robot), settings.unknowns, settings.start)
+    return identify(robot, read_recording(short, robot), settings.unknowns, settings.start)
 
 
 def test_the_command_leaves_all_that_is_promised_or_nothing(short, settings, tmp_path):
     out, told = tmp_path / "out", []
-    words = identify(short, settings, out, False, lambda: told.append(1))
+    words = identify_file(short, settings, out, False, lambda: told.append(1))
     assert sorted(path.name for path in out.iterdir()) == FILES
     assert (out / "identified.png").read_bytes().startswith(b"\x89PNG")
     assert words.startswith("payload_mass 1.0")
     assert len(told) >= 4  # two fits of two steps at least
     with pytest.raises(ValueError, match="is not empty"):
-        identify(short, settings, out, False)
+        identify_file(short, settings, out, False)
     (tmp_path / "wrong.csv").write_text("time [s]\n0\n")
     with pytest.raises(ValueError, match="are missing"):
-        identify(tmp_path / "wrong.csv", settings, out, True)
+        identify_file(tmp_path / "wrong.csv", settings, out, True)
     assert (out / "identified.md").is_file()  # what was there before
     (out / "mine.csv").write_text(short.read_text())
     with pytest.raises(ValueError, match=r"mine\.csv lies in it"):
-        identify(out / "mine.csv", settings, out, True)
+        identify_file(out / "mine.csv", settings, out, True)
 
 
 def test_the_files_hold_the_numbers_of_the_identification(found, short, settings, tmp_path):
@@ -104,7 +104,7 @@ def test_a_contradiction_is_refused_with_the_files_name_and_can_be_overruled(sho
     wrong = tmp_path / "wrong.csv"
     wrong.write_text("\n".join([header, *map(",".join, rows)]) + "\n", encoding="utf-8")
     with pytest.raises(ContradictionError, match=r"wrong\.csv: .*steering_1 has the other sign.*--set check=false"):
-        identify(wrong, settings, tmp_path / "out", False)
+        identify_file(wrong, settings, tmp_path / "out", False)
     assert not (tmp_path / "out").exists()
 
 
@@ -146,7 +146,7 @@ def test_what_is_not_told_is_said_and_has_no_interval(short, tmp_path):
     still.write_text("\n".join([rows[0], *(",".join([t, *first[:3], "0", "0", "0", *first[6:9], *["0"] * 9])
                                           for t in time[1:])]))  # fmt: skip
     robot = load_robot("chung2008")
-    found = estimate(robot, read_recording(still, robot), PAYLOAD[:1])
+    found = identify(robot, read_recording(still, robot), PAYLOAD[:1])
     write_identification(found, still, read_identify("chung2008", PAYLOAD[:1]), tmp_path)
     text = (tmp_path / "identified.md").read_text(encoding="utf-8")
     assert "| payload_mass | 0.5 | not told | kg |" in text

@@ -168,6 +168,21 @@ def test_dir_shows_the_public_names(installed, tmp_path):
     assert "__version__" in names
 
 
+def test_papers_run_in_a_clone_beside_the_installed_package(installed, tmp_path):
+    """They are no part of the wheel, which holds one top-level package; nothing but their folder is needed."""
+    shutil.copytree(ROOT / "papers", tmp_path / "papers", ignore=shutil.ignore_patterns("__pycache__"))
+    code = (
+        "import runpy, sys\n"
+        f"sys.path.insert(0, {str(tmp_path)!r})\n"
+        "sys.argv = ['papers', '--help']\n"
+        "from papers.kim2001.isotropy_search import printed_cells\n"
+        "assert len(printed_cells(1)) == 25\n"
+        "runpy.run_module('papers', run_name='__main__')\n"
+    )
+    assert "python -m papers [OPTIONS] PAPER" in python(code, installed, tmp_path)
+    assert "papers" not in {path.name for path in installed.rglob("*")}
+
+
 def test_environments_are_registered_by_the_import(installed, tmp_path):
     code = "import caster_gym, gymnasium\nprint(*(name for name in gymnasium.registry if name.startswith('Caster')))"
     assert "CasterTrack-v0" in python(code, installed, tmp_path).split()

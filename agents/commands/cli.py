@@ -171,8 +171,8 @@ def design(
 ) -> None:
     """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
     with plain_errors(NOTHING_WRITTEN):
-        from caster_gym.design.command import design as run
-        from caster_gym.design.command import read_design
+        from caster_gym.design import design as run
+        from caster_gym.design import read_design
 
         settings = read_design(target, robot, changes_of(change))
         with progress(total=100, desc=f"design of {Path(settings.robot).stem}", unit="%") as show:
@@ -209,8 +209,7 @@ def identify(
 ) -> None:
     """Payload, friction, wheels, motors and zeros of a robot from a recording, with intervals, and a robot file."""
     with plain_errors(NOTHING_WRITTEN):
-        from caster_gym.identification.command import PAYLOAD, read_identify, write_example
-        from caster_gym.identification.command import identify as run
+        from caster_gym.identification import PAYLOAD, identify_file, read_identify, write_example
 
         if example is not None and recording is None:
             typer.echo(write_example(example, robot, seed, overwrite))
@@ -220,7 +219,7 @@ def identify(
         settings = read_identify(robot, unknown or PAYLOAD, changes_of(change))
         step = count(1)
         with progress(desc="identify", unit="step") as show:
-            words = run(recording, settings, out, overwrite, lambda: show(next(step)))
+            words = identify_file(recording, settings, out, overwrite, lambda: show(next(step)))
         typer.echo(words)
         typer.echo(f"The page, the figure and robot.yaml are in {out}.")
 

@@ -327,10 +327,10 @@ class _Search:
         return global_isotropies(
             self.robot,
             self.robot.driven,
-            radius,
-            trail,
             (target.speed, target.speed, target.yaw_rate),
             self.robot.max_speeds[self.robot.driven_indices],
+            radius,
+            trail,
             isotropy_interval(self.robot.caster_count),
         )
 

@@ -65,7 +65,7 @@ def read_identify(
     return parse(IdentifySettings, {"robot": robot, "unknowns": list(unknowns), **(changes or {})}, "identify")
 
 
-def identify(
+def identify_file(
     recording: Path, settings: IdentifySettings, out: Path, overwrite: bool, report: Callable[[], None] = lambda: None
 ) -> str:
     """What the command does: all results in the folder `out`, or, if anything goes wrong, none; returns the table.
@@ -85,10 +85,10 @@ def identify(
             raise ContradictionError(f"{recording}: {error}") from None
     with staged(out, overwrite) as folder:
         from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
-        from caster_gym.identification.fit import identify as estimate  # late: Torch takes seconds
+        from caster_gym.identification.fit import identify  # late: Torch takes seconds
 
         with limit_threads(DEFAULT):
-            found = estimate(
+            found = identify(
                 robot,
                 recorded,
                 settings.unknowns,

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.arrays import Array
-from caster_gym.design.singular_lines import action_lines
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import load_robot
+from papers.analysis.action_lines import action_lines
 from papers.analysis.joint_kinematics import forward_jacobian
 from papers.analysis.orthogonal_complement import OrthogonalComplement
 from papers.chung2008.complement_runs import DISTANCES, PERIOD, Approach, relative

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from caster_gym.arrays import Array
-from caster_gym.design.singular_lines import action_lines
 from caster_gym.engines.numpy_model import Model
 from caster_gym.robot import Robot
+from papers.analysis.action_lines import action_lines
 from papers.analysis.coordinate_switching import forward_dynamics, singular_steering
 from papers.analysis.driven_motion import steady_steering
 from papers.analysis.orthogonal_complement import OrthogonalComplement

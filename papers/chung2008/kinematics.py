@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
-from caster_gym.design.joint_sets import JointSet, classify_all, proved_brackets, rounded_down
+from caster_gym.design.joint_sets import JointSet
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import link_mass_centre, rate_drifts, wheel_centre
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.robot import load_robot
 from papers.analysis import mobility
 from papers.analysis.joint_kinematics import DELTA, ETA, THETA, forward_jacobian
+from papers.analysis.joint_sets import classify_all, proved_brackets, rounded_down
 from papers.jacobian_checks import (
     ROUNDING,
     check_inverse,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from caster_gym.arrays import Array
-from caster_gym.design.isotropy import isotropy
 from caster_gym.report.figures import COLOURS, new_figure
+from papers.analysis.isotropy import isotropy
 from papers.kim2001.isotropy_search import RATIOS, ROBOT, SIX, indices
 from papers.notation import KIM2001
 

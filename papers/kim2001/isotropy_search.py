@@ -85,7 +85,7 @@ def indices(
     one = np.ones_like(rate)
     tops = np.stack([one if joint.startswith("roll") else rate for joint in joints], axis=1)
     twists = np.stack([1.0 / twist, 1.0 / twist, one], axis=1)
-    return global_isotropies(ROBOT, joints, radius, trail, twists, tops, interval).reshape(parts[0].shape)
+    return global_isotropies(ROBOT, joints, twists, tops, radius, trail, interval).reshape(parts[0].shape)
 
 
 @cache

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.design.joint_sets import Class, JointSet, set_types
-from caster_gym.design.singular_lines import kind_and_caster
+from caster_gym.design.joint_sets import Class, JointSet, kind_and_caster
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
+from papers.analysis.joint_sets import set_types
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

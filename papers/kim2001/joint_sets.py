@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from caster_gym.design.joint_sets import Bracket, JointSet, classify_all, proved_brackets, rounded_down, set_types
-from caster_gym.design.singular_lines import kind_and_caster, smallest_singular_value
+from caster_gym.design.joint_sets import JointSet, kind_and_caster
 from caster_gym.robot import Robot, load_robot
+from papers.analysis.action_lines import smallest_singular_value
+from papers.analysis.joint_sets import Bracket, classify_all, proved_brackets, rounded_down, set_types
 from papers.kim2001.joint_set_lattice import CLASSES, joint_set_lattice
 from papers.notation import KIM2001, in_letters, in_words, kim2001_robot
 from papers.page import Check, Difference, Picture, Section, Table

@@ -7,10 +7,10 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
-from caster_gym.design.singular_lines import MEETS, action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
+from papers.analysis.action_lines import MEETS, action_lines, meeting, smallest_singular_value
 from papers.notation import kim2001_robot
 from papers.page import Check, Picture, Section
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from caster_gym.design.isotropy import balanced_isotropy, isotropy
+from papers.analysis.isotropy import balanced_isotropy, isotropy
 from papers.kim2001.isotropy_pictures import FIGURES, TWIST, best_quotient, contours, local_indices
 from papers.kim2001.isotropy_search import (
     FOUR,

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
 from caster_gym.design.joint_sets import turned_parallel, turned_towards
-from caster_gym.design.singular_lines import action_lines, meeting, smallest_singular_value
 from caster_gym.engines.numpy_model import Model
 from caster_gym.report.figures import new_figure
+from papers.analysis.action_lines import action_lines, meeting, smallest_singular_value
 from papers.line_drawing import LEGEND, draw_lines
 from papers.notation import KIM2001, Lengths, in_letters, in_words, kim2001_robot, lengths_of
 from papers.page import Check, Difference, Picture, Section

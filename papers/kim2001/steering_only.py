@@ -4,8 +4,8 @@ import numpy as np
 
 from caster_gym.analysis.frames import turn_planar
 from caster_gym.arrays import Array
-from caster_gym.design.singular_lines import smallest_singular_value
 from caster_gym.engines.numpy_model import Model
+from papers.analysis.action_lines import smallest_singular_value
 from papers.analysis.driven_motion import steady_steering
 from papers.kim2001.isotropy_search import RATIOS, ROBOT, TYPES, searched
 from papers.notation import in_words

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.design.joint_sets import Bracket, JointSet, classify, least_singular_value
-from caster_gym.design.singular_lines import smallest_singular_value
+from caster_gym.design.joint_sets import JointSet, classify
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.robot import Robot
+from papers.analysis.action_lines import smallest_singular_value
+from papers.analysis.joint_sets import Bracket, least_singular_value
 from papers.line_drawing import LEGEND, draw_lines
 from papers.notation import KIM2001, in_letters, in_words, kim2001_robot
 from papers.page import Check, Difference, Picture, Section, Table

@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
 from caster_gym import load_robot
-from caster_gym.design.joint_sets import classify_all, set_types
+from papers.analysis.joint_sets import classify_all, set_types
 from papers.kim2001.joint_set_lattice import CLASS_COLOURS, CLASSES, joint_set_lattice
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from caster_gym.design.singular_lines import action_lines, meeting
+from papers.analysis.action_lines import action_lines, meeting
 from papers.kim2001.lines import compare_random, compare_singular, section, singular_configurations
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from caster_gym import Model
-from caster_gym.design.singular_lines import smallest_singular_value
+from papers.analysis.action_lines import smallest_singular_value
 from papers.kim2001.singularity import (
     FOUR_JOINTS,
     JOINTS_2,

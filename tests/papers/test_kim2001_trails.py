@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from caster_gym.design.joint_sets import classify
-from caster_gym.design.singular_lines import smallest_singular_value
+from papers.analysis.action_lines import smallest_singular_value
 from papers.kim2001.trails import THREE_MOTORS, section, unequal_robot
 from papers.page import unexplained
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from caster_gym import Model, load_robot
-from caster_gym.design.singular_lines import MEETS, action_lines, meeting, smallest_singular_value
+from papers.analysis.action_lines import MEETS, action_lines, meeting, smallest_singular_value
 from tests.random_robots import CASTER_COUNTS, random_robot
 
 CHUNG = load_robot("chung2008")

@@ -22,10 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from caster_gym.analysis.checked import finite
 from caster_gym.arrays import Array
+from caster_gym.design.joint_sets import kind_and_caster, named_joints
 from caster_gym.engines.numpy_model import Model
 from caster_gym.mechanics.caster import wheel_centre
 from caster_gym.mechanics.parameters import CasterParameters, robot_parameters
-from caster_gym.robot import Robot, check_joints
+from caster_gym.robot import Robot
 
 MEETS = 1e-9  # [-] gap up to which lines meet, share of L beyond 1/MEETS of which they are parallel: far above rounding
 _UNIT = 1e-6  # [-] by which the directions of given lines may miss unit length
@@ -112,19 +113,6 @@ def smallest_singular_value(robot: Robot, steering: ArrayLike, joints: str | Seq
         return np.zeros(lines.shape[:-2])
     values: Array = np.linalg.svd(lines / (1.0, 1.0, model.characteristic_length), compute_uv=False)
     return values[..., -1]
-
-
-def named_joints(robot: Robot, joints: str | Sequence[str]) -> tuple[str, ...]:
-    """The joints that "all", one name or several mean. Raises ValueError for an unknown or repeated one."""
-    if isinstance(joints, str):
-        return robot.joints if joints == "all" else check_joints((joints,), robot.caster_count)
-    return check_joints(tuple(joints), robot.caster_count)
-
-
-def kind_and_caster(joint: str) -> tuple[str, int]:
-    """("roll", 0) for roll_1."""
-    kind, number = joint.split("_")
-    return kind, int(number) - 1
 
 
 def _line(kind: str, angle: Array, caster: CasterParameters) -> Array:

@@ -1,0 +1,56 @@
+"""Rooms are closed: who imports what from where."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+OPEN = {
+    "caster_gym.design": {"caster_gym.design", "caster_gym.design.isotropy", "caster_gym.design.joint_sets"},
+    "caster_gym.identification": {"caster_gym.identification"},
+}
+BELOW_AGENTS = ("analysis", "report", "design", "identification")
+
+
+def modules(*folders: str) -> dict[str, Path]:
+    """Source files by module name; the links in caster_gym to agents and configs are not followed."""
+    names = {"agents": "caster_gym.agents"}
+    found = {}
+    for folder in folders:
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            parts = file.relative_to(ROOT).with_suffix("").parts
+            if parts[:2] not in (("caster_gym", "agents"), ("caster_gym", "configs")):
+                found[".".join((names.get(parts[0], parts[0]), *parts[1:])).removesuffix(".__init__")] = file
+    return found
+
+
+def imported(file: Path) -> Iterator[str]:
+    """Modules that a file imports, also late, within functions."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (one.name for one in node.names)
+
+
+@pytest.mark.parametrize("room", OPEN)
+def test_nobody_reaches_into_a_room(room):
+    inner = {name for name in modules("caster_gym") if name.startswith(f"{room}.")}
+    assert len(inner) > 5
+    for name, file in modules("caster_gym", "agents", "papers", "scripts").items():
+        if name != room and name not in inner:
+            reached = {one for one in imported(file) if one == room or one.startswith(f"{room}.")}
+            assert reached <= OPEN[room], name
+
+
+@pytest.mark.parametrize("room", BELOW_AGENTS)
+def test_rooms_below_the_agents_do_not_import_them(room):
+    for name, file in modules(f"caster_gym/{room}").items():
+        assert not [one for one in imported(file) if one.startswith("caster_gym.agents")], name
+
+
+def test_what_is_installed_imports_nothing_that_is_not():
+    for name, file in modules("caster_gym", "agents").items():
+        assert not {one.split(".")[0] for one in imported(file)} & {"papers", "scripts", "tests"}, name
