@@ -179,8 +179,8 @@ def test_papers_run_in_a_clone_beside_the_installed_package(installed, tmp_path)
         "assert len(printed_cells(1)) == 25\n"
         "runpy.run_module('papers', run_name='__main__')\n"
     )
-    assert "python -m papers [OPTIONS] PAPER" in python(code, installed, tmp_path)
-    assert "papers" not in {path.name for path in installed.rglob("*")}
+    assert "Usage: python -m papers [OPTIONS] {paper}" in python(code, installed, tmp_path)
+    assert not list(installed.rglob("kim2001"))  # the folder of one of them
 
 
 def test_environments_are_registered_by_the_import(installed, tmp_path):
