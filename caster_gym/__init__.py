@@ -6,7 +6,7 @@ All that users need is handed on from here, and is imported when it is first ask
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gymnasium import register
+from caster_gym.tasks import registry as _tasks
 
 if TYPE_CHECKING:
     from caster_gym import mechanics, wrappers
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from caster_gym.engines.numpy_model import Model
     from caster_gym.engines.tensor.fleet import TorchFleet
     from caster_gym.engines.tensor.model import TorchModel
-    from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-    from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
     from caster_gym.envs.observation import ObservationLayout
     from caster_gym.envs.tensor.task import TorchTask
     from caster_gym.envs.tensor.vector_env import TorchVectorEnv
@@ -30,6 +28,8 @@ if TYPE_CHECKING:
     from caster_gym.paths.specification import build_trajectories, read_paths
     from caster_gym.paths.trajectory import Trajectory
     from caster_gym.robot import Robot, load_robot
+    from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+    from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 
 __version__ = "0.1.0"
 __all__ = [
@@ -64,10 +64,10 @@ __all__ = [
 # The module that each name comes from. Whoever moves one changes it here and among the imports above.
 _HOMES = {
     "Arena": "caster_gym.arena.arena",
-    "CasterFollowEnv": "caster_gym.envs.caster_follow",
-    "CasterFollowVectorEnv": "caster_gym.envs.caster_follow",
-    "CasterTrackEnv": "caster_gym.envs.caster_track",
-    "CasterTrackVectorEnv": "caster_gym.envs.caster_track",
+    "CasterFollowEnv": "caster_gym.tasks.follow.environment",
+    "CasterFollowVectorEnv": "caster_gym.tasks.follow.environment",
+    "CasterTrackEnv": "caster_gym.tasks.track.environment",
+    "CasterTrackVectorEnv": "caster_gym.tasks.track.environment",
     "ComputedTorque": "caster_gym.agents.control.computed_torque",
     "ConfigurationError": "caster_gym.configuration",
     "Fleet": "caster_gym.engines.native.fleet",
@@ -90,16 +90,8 @@ _HOMES = {
 }
 _MODULES = ("mechanics", "wrappers")
 
-register(
-    id="CasterTrack-v0",
-    entry_point="caster_gym:CasterTrackEnv",
-    vector_entry_point="caster_gym:CasterTrackVectorEnv",
-)
-register(
-    id="CasterFollow-v0",
-    entry_point="caster_gym:CasterFollowEnv",
-    vector_entry_point="caster_gym:CasterFollowVectorEnv",
-)
+for _name in _tasks.TASKS:
+    _tasks.register_environments(_name)
 
 
 def __getattr__(name: str) -> Any:

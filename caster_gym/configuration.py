@@ -271,7 +271,7 @@ def _item(place: _Place, number: int) -> _Place:
 
 
 def _members(*annotations: Any) -> tuple[Any, ...]:
-    """The types that annotations allow, their unions and metadata unfolded."""
+    """The types that annotations allow, their unions and metadata unfolded; of a model, its kinds too."""
     members: list[Any] = []
     for annotation in annotations:
         if get_origin(annotation) is Annotated:
@@ -279,7 +279,7 @@ def _members(*annotations: Any) -> tuple[Any, ...]:
         elif get_origin(annotation) in (Union, UnionType):
             members += _members(*get_args(annotation))
         else:
-            members.append(annotation)
+            members += [annotation, *(annotation.__subclasses__() if _is_model(annotation) else ())]
     return tuple(members)
 
 

@@ -25,7 +25,6 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from tqdm import tqdm
 
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
-from caster_gym.agents.comparison.metrics import yardstick
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.agents.learning.actor import Actor
@@ -201,7 +200,7 @@ def train_timed(name: str, task: TaskSettings, settings: LearnerSettings, seed: 
 def trials(task: TaskSettings, agent: Agent) -> tuple[Trial, ...]:
     """Episodes of an agent on all test paths, from the benchmark's starts and some more."""
     batch = test_batch(task, task.test, STARTS)
-    how = yardstick(bare(batch).task)
+    how = bare(batch).definition.metrics
     episodes = roll_out(agent, batch, TEST_SEED)
     metrics = how.measure(episodes, how.settling)
     told = zip(episodes.names, metrics.position_rmse.tolist(), metrics.failed.tolist(), strict=True)

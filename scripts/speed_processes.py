@@ -30,7 +30,8 @@ import gymnasium as gym
 import numpy as np
 from caster_gym import load_robot
 from caster_gym.engines.native.fleet import Fleet
-from caster_gym.envs.setup import track_engine
+from caster_gym.tasks.building import build_engine
+from caster_gym.tasks.registry import find_task
 
 def environment(count):
     batch = gym.make_vec({TRACK!r}, num_envs=count, robot=ROBOT)
@@ -40,7 +41,7 @@ def environment(count):
     return batch, last
 
 def engine(count):
-    batch, _ = track_engine(ROBOT, "random_paths", None, None, dict(), count)
+    batch, _ = build_engine(find_task("track"), ROBOT, None, None, None, dict(), count)
     batch.restart(np.arange(count))
     for _ in range(3):
         last = batch.step(np.zeros((count, len(batch.robot.driven)), dtype=np.float32))

@@ -14,7 +14,7 @@ from caster_gym.arena.arena import Pillar
 from caster_gym.arena.packing import surroundings
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.engines.native.threads import set_threads
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from scripts.speed_timing import RATE, Row, Work, at_least, at_most, rate
 
 TRACK, FOLLOW = "caster_gym:CasterTrack-v0", "caster_gym:CasterFollow-v0"

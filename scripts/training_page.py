@@ -3,9 +3,8 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from caster_gym.agents.comparison.metrics import Verdict
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.report.pages import join_parts, paragraph
@@ -26,7 +25,7 @@ class Point(NamedTuple):
 
     steps: int  # control periods so far
     seconds: float  # of the processor so far, validations left out
-    verdict: Verdict
+    verdict: Any  # of the task's metrics
 
 
 class Trial(NamedTuple):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from caster_gym.agents.comparison.evaluation import Episodes
+from caster_gym.tasks.episodes import Episodes
 
 PERIOD = 0.5
 STEPS = 6  # three seconds
@@ -17,12 +17,12 @@ def column(*values):
 
 def episodes(lengths=(STEPS,), goal=np.nan, law=np.nan, **changed):
     """Episodes of zeros that last so many steps, with NaN behind; what is changed is stretched to its full shape."""
-    count = len(lengths)
+    count, facts = len(lengths), {"goal": goal, "law": law}
     widths = {"torque": (MOTORS,), "share": (MOTORS,), "command": (len(DRIVEN),), "pose": (4,), "reference": (4,)}
     series = {}
-    facts = ("names", "period", "driven", "failed", "allowed", "goal", "law")
+    others = ("names", "period", "driven", "failed", "allowed", "facts")
     for name in Episodes._fields:
-        if name not in facts:
+        if name not in others:
             shape = (STEPS, count, *widths.get(name, ()))
             series[name] = np.array(np.broadcast_to(changed.pop(name, 0.0), shape), dtype=np.float64)
             for episode, length in enumerate(lengths):
@@ -35,6 +35,5 @@ def episodes(lengths=(STEPS,), goal=np.nan, law=np.nan, **changed):
         driven=DRIVEN,
         failed=np.array([length < STEPS for length in lengths]),
         allowed=np.full(count, STEPS),
-        goal=np.broadcast_to(np.asarray(goal, dtype=np.float64), count),
-        law=np.broadcast_to(np.asarray(law, dtype=np.float64), count),
+        facts={name: np.broadcast_to(np.asarray(it, dtype=np.float64), count) for name, it in facts.items()},
     )

@@ -11,10 +11,8 @@ from numpy.testing import assert_array_equal
 
 from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
-from caster_gym.agents.comparison.follow_metrics import FollowMetrics, FollowVerdict
 from caster_gym.agents.comparison.results import Contender, compare
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.comparison.track_metrics import TrackMetrics, TrackVerdict, measure
 from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history, tune
 from caster_gym.agents.control.computed_torque import ComputedTorque, ComputedTorqueSettings
 from caster_gym.agents.control.protocol import ControllerSettings
@@ -25,6 +23,8 @@ from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError
 from caster_gym.shipped_files import names_of, read_settings
+from caster_gym.tasks.follow.metrics import FollowMetrics, FollowVerdict
+from caster_gym.tasks.track.metrics import TrackMetrics, TrackVerdict, measure
 
 test_batch.__test__ = False  # a name that pytest would take for a test
 

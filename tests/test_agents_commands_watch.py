@@ -18,8 +18,8 @@ from caster_gym.agents.control.keyboard import (
     keys_of_window,
     wanted_shares,
 )
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.render.pygame_loader import pygame
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 
 RANDOM = {"shape": "random_paths", "duration": 2.2, "max_speed": 0.3}
 STEPS = 110  # of 0.02 s in those seconds

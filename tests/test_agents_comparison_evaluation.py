@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from caster_gym.agents.comparison.evaluation import Episodes, bare, roll_out, test_batch, training_batch
+from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import parse
+from caster_gym.tasks.episodes import Episodes
 
 test_batch.__test__ = False  # a name that pytest would take for a test
 
@@ -87,7 +88,7 @@ def test_series_last_as_long_as_their_paths():
     lengths = [len(one) - 1 for one in bare(batch).engine.plan.tables]
     assert lengths == [150, 150, 400]
     assert not found.failed.any()
-    facts = ("names", "period", "driven", "failed", "allowed", "goal", "law")
+    facts = ("names", "period", "driven", "failed", "allowed", "facts")
     for name in (name for name in Episodes._fields if name not in facts):
         series = getattr(found, name).reshape(len(found.reward), 3, -1)
         assert (~np.isnan(series)).all(axis=2).sum(axis=0).tolist() == lengths

@@ -11,11 +11,12 @@ from matplotlib.patches import Circle, Polygon
 
 from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
 from caster_gym.agents.comparison.figures import draw_learning, draw_obstacles, draw_path, draw_speeds, learning_curves
-from caster_gym.agents.comparison.follow_metrics import FollowVerdict
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import parse
+from caster_gym.tasks.follow.metrics import FollowVerdict
+from caster_gym.tasks.task import Pictures
 
 test_batch.__test__ = False  # a name that pytest would take for a test
 
@@ -59,7 +60,7 @@ def test_obstacles_stand_where_they_are(driven, axis):
 
 def test_paths_are_drawn_as_they_were_driven(driven, axis):
     plan, episodes = driven
-    draw_path(axis, episodes, 0, COLOURS, plan)
+    draw_path(axis, episodes, 0, COLOURS, plan, Pictures())
     lines = {line.get_label(): line.get_xydata() for line in axis.lines}
     assert_allclose(np.hypot(*lines["path"].T), 1.0)
     assert_allclose(lines["computed torque"], episodes["computed torque"].pose[:, 0, :2])

@@ -2,17 +2,16 @@
 
 import pytest
 
-from caster_gym.agents.comparison.follow_metrics import FollowVerdict
-from caster_gym.agents.comparison.metrics import in_words, yardstick
-from caster_gym.agents.comparison.track_metrics import TrackVerdict
-from caster_gym.envs.follow_task import FollowTask
-from caster_gym.envs.track_task import TrackTask
+from caster_gym.agents.comparison.metrics import in_words
+from caster_gym.tasks.follow.metrics import FollowVerdict
+from caster_gym.tasks.registry import find_task
+from caster_gym.tasks.track.metrics import TrackVerdict
 from tests.series import episodes
 
 
-@pytest.mark.parametrize(("task", "verdict"), [(TrackTask(), TrackVerdict), (FollowTask(), FollowVerdict)])
+@pytest.mark.parametrize(("task", "verdict"), [("track", TrackVerdict), ("follow", FollowVerdict)])
 def test_a_verdict_is_on_what_was_measured(task, verdict):
-    how = yardstick(task)
+    how = find_task(task).metrics
     found = how.verdict.of(how.measure(episodes(), how.settling))
     assert isinstance(found, verdict)
     assert found.failures == 0

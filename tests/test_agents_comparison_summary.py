@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.agents.comparison.follow_metrics import FollowMetrics
-from caster_gym.agents.comparison.measuring import Counted, Printed, shown
 from caster_gym.agents.comparison.summary import (
     Estimate,
     Result,
@@ -19,7 +17,9 @@ from caster_gym.agents.comparison.summary import (
     write_episodes,
     write_summary,
 )
-from caster_gym.agents.comparison.track_metrics import TrackMetrics
+from caster_gym.tasks.follow.metrics import FollowMetrics
+from caster_gym.tasks.measuring import Counted, Printed, shown
+from caster_gym.tasks.track.metrics import TrackMetrics
 
 EPISODES = 4
 

@@ -10,10 +10,10 @@ from gymnasium.vector import AutoresetMode
 from caster_gym.agents.comparison.evaluation import bare, make_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.configuration import ConfigurationError, parse
-from caster_gym.envs.follow_task import FollowTask
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import load_robot
 from caster_gym.shipped_files import find, read_settings
+from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.track.parameters import TrackParameters
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {
@@ -76,25 +76,28 @@ def test_what_is_wrong_with_a_task_is_named():
 
 
 def test_an_environment_has_tasks_of_its_own():
-    assert parse(TaskSettings, PATHS, "task").task == TrackTask()
+    assert parse(TaskSettings, PATHS, "task").task == TrackParameters()
     following = parse(TaskSettings, {**PATHS, "environment": "follow", "task": {"speed_limit": 0.5}}, "task")
-    assert following.task == FollowTask(speed_limit=0.5)
-    assert parse(TaskSettings, {**PATHS, "environment": "follow"}, "task").task == FollowTask()
+    assert following.task == FollowParameters(speed_limit=0.5)
+    assert parse(TaskSettings, {**PATHS, "environment": "follow"}, "task").task == FollowParameters()
     assert parse(TaskSettings, following.model_dump(mode="json"), "task") == following
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"environment": "flow"}, "task: 'environment' should be 'track' or 'follow', got 'flow'$"),
+        (
+            {"environment": "flow"},
+            "task: 'environment' should be 'track', 'follow' or 'module:Name' of your own, got 'flow'$",
+        ),
         ({"task": {"speed_limit": 1.0}}, "'speed_limit' is for environment 'follow', got it with environment 'track'"),
         (
             {"environment": "follow", "task": {"position_weight": 1.0}},
             "'position_weight' is for environment 'track', got it with environment 'follow'",
         ),
         (
-            {"environment": "follow", "task": TrackTask()},
-            "must be a FollowTask in environment 'follow', got a TrackTask",
+            {"environment": "follow", "task": TrackParameters()},
+            "must be a FollowParameters in environment 'follow', got a TrackParameters",
         ),
         ({"environment": "follow", "task": {"speed_limt": 1.0}}, r"'task\.speed_limt'; did you mean 'speed_limit'\?"),
         ({"task": {"margn": 0.5}}, r"unknown key 'task\.margn'; known are (?!.*margin)"),  # a key of the other task

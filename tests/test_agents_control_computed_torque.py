@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.agents.comparison.evaluation import roll_out
-from caster_gym.agents.comparison.track_metrics import measure
 from caster_gym.agents.control.computed_torque import ComputedTorque, gains, known_model
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.engines.numpy_model import Model
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import load_robot
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
+from caster_gym.tasks.track.metrics import measure
 
 COUNT = 16
 FREQUENCY = 10.0  # [rad/s]

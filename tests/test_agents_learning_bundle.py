@@ -17,17 +17,17 @@ from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import actor_of, make_learner
 from caster_gym.agents.learning.settings import PPOSettings, SACSettings
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
-from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import load_robot
+from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
+from caster_gym.tasks.track.parameters import TrackParameters
 from caster_gym.wrappers import MotorLag, TwistCommands
 
 ROBOT = load_robot("chung2008")
-TASK = TrackTask(corridor=0.4)
+TASK = TrackParameters(corridor=0.4)
 LAYOUT = ObservationLayout(ROBOT, TASK.preview)
-FOLLOWED = ObservationLayout(ROBOT, FollowTask().preview, "m", FollowTask().nearest)
+FOLLOWED = ObservationLayout(ROBOT, FollowParameters().preview, "m", FollowParameters().nearest)
 HIDDEN = (16, 8)
 
 
@@ -274,7 +274,7 @@ def test_a_policy_is_refused_where_it_cannot_act():
 
 
 def test_a_policy_is_refused_in_the_other_environment():
-    tracks, follows = fresh_bundle(), fresh_bundle(environment="follow", task=FollowTask())
+    tracks, follows = fresh_bundle(), fresh_bundle(environment="follow", task=FollowParameters())
     layout = follows.description.layout
     follows.check_fits(layout, TASK.control_period)
     assert layout.size == FOLLOWED.size

@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import Tolerance, wrap
 
 TASK = {"corridor": 0.08, "path": {"shape": "circle", "radius": 0.5}}  # starts lie up to 0.07 m from the path

@@ -14,7 +14,7 @@ from caster_gym.agents.learning.training import train
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.task import TorchTask
-from caster_gym.envs.track_task import TrackTask
+from caster_gym.tasks.track.parameters import TrackParameters
 
 QUICK = {"control_period": 0.01, "substeps": 1}  # one RK4 step a period: Torch alone, uncompiled, is slow
 PATH = {"shape": "random_paths", "duration": 2.5, "max_speed": 0.3, "count": 2}
@@ -238,7 +238,7 @@ def test_a_missing_compiler_is_named_with_the_setting():
 def test_robots_learn_with_as_few_time_steps_as_their_casters_allow(robot, period, own, taken):
     """A trail of 25 mm at 2.5 m/s asks for steps of 10 ms or less."""
     fields = {"control_period": period, "substeps": own, "preview": (0.1,)}
-    task = TASK.model_copy(update={"robot": robot, "task": TrackTask(**fields)})
+    task = TASK.model_copy(update={"robot": robot, "task": TrackParameters(**fields)})
     settings = parse(SHACSettings, FIELDS, "agent")
     assert make_task(task, settings).task.substeps == taken
     assert make_task(task, settings.model_copy(update={"substeps": own})).task.substeps == own

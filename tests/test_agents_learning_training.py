@@ -12,7 +12,6 @@ import caster_gym
 from caster_gym.agents.comparison import evaluation
 from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.comparison.track_metrics import TrackVerdict, measure
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.agents.learning.training import train
@@ -21,6 +20,7 @@ from caster_gym.configuration import parse
 from caster_gym.engines.native.threads import get_threads
 from caster_gym.engines.tensor.threads import DEFAULT
 from caster_gym.shipped_files import read_settings
+from caster_gym.tasks.track.metrics import TrackVerdict, measure
 
 HELD_OUT_SEED = 7
 TINY = {"hidden": (8,), "robots": 8, "batch": 64, "validations": 2}

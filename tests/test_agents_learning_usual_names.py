@@ -14,12 +14,12 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.registry import read_agent
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError, parse
-from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.follow_task import FollowTask
-from caster_gym.envs.task import Task
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.floor import Floor
 from caster_gym.robot import Platform, Robot, load_robot
+from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.track.environment import CasterTrackEnv
+from caster_gym.tasks.track.parameters import TrackParameters
 from caster_gym.wrappers import Friction, read_features
 
 LEARNERS = ("ppo", "ppo_gpu", "sac", "shac")
@@ -51,7 +51,7 @@ def refusal(read, content):
 
 def test_usual_names_and_those_of_fields_are_different_ones():
     """Otherwise the answer would never be given."""
-    for model in (*map(kind, LEARNERS), TaskSettings, BenchmarkSettings, TrackTask, FollowTask):
+    for model in (*map(kind, LEARNERS), TaskSettings, BenchmarkSettings, TrackParameters, FollowParameters):
         assert not model.usual_names.keys() & model.model_fields.keys()
 
 
@@ -100,8 +100,8 @@ def test_answers_name_fields_and_options_that_exist():
     for model in (
         *map(kind, LEARNERS),
         kind("computed_torque"),
-        TrackTask,
-        FollowTask,
+        TrackParameters,
+        FollowParameters,
         TaskSettings,
         BenchmarkSettings,
         Arena,
@@ -193,7 +193,7 @@ def test_settings_of_learners_are_sent_away_from_comparisons():
 @pytest.mark.parametrize("name", ["dt", "frame_skip", "decimation", "lookahead"])
 def test_usual_names_of_environments_get_an_answer(name):
     """In their constructors too, and what is advised is accepted."""
-    here = Task.usual_names[name]
+    here = TaskParameters.usual_names[name]
     with pytest.raises((TypeError, ValueError), match=f"it is called '{here}' here"):
         CasterTrackEnv(path=RANDOM, **{name: 1})
-    CasterTrackEnv(path=RANDOM, **{here: TrackTask().model_dump()[here]})
+    CasterTrackEnv(path=RANDOM, **{here: TrackParameters().model_dump()[here]})

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.tipping import LiftWarning, least_load, warn_if_lifting
-from caster_gym.envs.caster_track import CasterTrackEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv
 
 
 def standing(name, height):

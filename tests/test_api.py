@@ -69,9 +69,9 @@ def prepared(tmp_path_factory):
         return folder
     from caster_gym.agents.learning.actor import Actor
     from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bundle
-    from caster_gym.envs.track_task import TrackTask
+    from caster_gym.tasks.track.parameters import TrackParameters
 
-    robot, task = caster_gym.load_robot("chung2008"), TrackTask()
+    robot, task = caster_gym.load_robot("chung2008"), TrackParameters()
     described = {"format": 1, "name": "PPO", "squash": "clip", "hidden": (8,), "trained_with": {}, "versions": {}}
     description = PolicyDescription(robot=robot, task=task, **described)
     actor = Actor(description.layout.size, (8,), len(robot.driven), "clip")

@@ -9,9 +9,9 @@ from gymnasium.vector import AutoresetMode
 from caster_gym.agents.comparison.evaluation import bare, make_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
-from caster_gym.envs.caster_follow import CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.shipped_files import read_settings
+from caster_gym.tasks.follow.environment import CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from tests.cheats import CHEATS, Cheat, FullTorque, scores
 
 PATHS = [

@@ -17,12 +17,12 @@ from caster_gym.engines.time_step import (
     longest_time_step,
     substeps_for,
 )
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from caster_gym.mechanics.dynamics import kinetic_energy
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters, unpack_parameters
 from caster_gym.mechanics.plant import driven_step
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import Friction, Payload, WheelErrors, wrap
 from tests.random_robots import random_robot
 

@@ -12,8 +12,8 @@ import pytest
 from gymnasium.wrappers import RecordEpisodeStatistics
 
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, MotorLag, Payload, Potential, Pushes, SensorNoise, Smoothness, wrap
 
 ARENA = {"path": {"shape": "circle", "radius": 0.5}, "arena": {"room": [[-1.0, -1.0], [1.0, 1.0]]}}

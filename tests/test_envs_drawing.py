@@ -13,9 +13,9 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 from gymnasium.wrappers.vector import HumanRendering, RecordVideo
 
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.render.viewer import SIZE
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 
 PATH = {"shape": "circle", "radius": 0.5}
 SINGLE, BATCH = [CasterFollowEnv, CasterTrackEnv], [CasterFollowVectorEnv, CasterTrackVectorEnv]

@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model, load_robot
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.follow_task import FollowTask
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.floor import Floor, Patch
+from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.track.parameters import TrackParameters
 from caster_gym.wrappers import Friction, wrap
 
 ICE = {"friction": 0.05}
@@ -273,7 +273,7 @@ def test_the_floor_stands_in_the_specification():
     assert again.task == env.unwrapped.task
 
 
-@pytest.mark.parametrize("kind", [TrackTask, FollowTask])
+@pytest.mark.parametrize("kind", [TrackParameters, FollowParameters])
 def test_a_task_comes_back_from_what_is_written_of_it(kind):
     for floor in ("grip", ICE, ISLANDS, {}):
         task = kind(floor=floor)

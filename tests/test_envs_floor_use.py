@@ -6,8 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.mechanics.parameters import GRAVITY
+from caster_gym.tasks.track.environment import CasterTrackEnv
 from tests.kane import Kane
 from tests.random_robots import random_robot
 

@@ -9,11 +9,11 @@ from numpy.testing import assert_array_equal
 
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.envs.inputs import check_keywords, checked_seeds, read_actions
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import SensorNoise, wrap
 
 TASK = {"path": {"shape": "circle", "radius": 0.5}}

@@ -10,9 +10,11 @@ from numba import typeof
 
 from caster_gym import load_robot
 from caster_gym.envs.native import compilation
-from caster_gym.envs.setup import follow_engine, track_engine
+from caster_gym.tasks.building import build_engine
+from caster_gym.tasks.registry import find_task
 
 ROOT = Path(__file__).resolve().parent.parent
+TRACK = find_task("track")
 FAR = {"room": [[-50.0, -50.0], [50.0, 50.0]]}
 
 
@@ -22,12 +24,12 @@ def types_of_restart(engine):
 
 
 @pytest.mark.parametrize(
-    ("build", "robot", "arena", "fields", "words"),
+    ("task", "robot", "arena", "fields", "words"),
     [
-        (track_engine, "chung2008", None, {}, "3 casters (CasterTrack, 3 previewed points)"),
-        (track_engine, "xr4000", None, {"preview": (0.1,)}, "4 casters (CasterTrack, 1 previewed point)"),
+        ("track", "chung2008", None, {}, "3 casters (CasterTrack, 3 previewed points)"),
+        ("track", "xr4000", None, {"preview": (0.1,)}, "4 casters (CasterTrack, 1 previewed point)"),
         (
-            follow_engine,
+            "follow",
             "chung2008",
             FAR,
             {"nearest": 2},
@@ -35,11 +37,10 @@ def types_of_restart(engine):
         ),
     ],
 )
-def test_what_is_compiled_is_named_by_all_that_it_is_compiled_for(build, robot, arena, fields, words):
+def test_what_is_compiled_is_named_by_all_that_it_is_compiled_for(task, robot, arena, fields, words):
     """Another number of casters, task or preview compiles anew, so that the words must tell them apart."""
-    engine, _ = build(
-        robot, {"shape": "circle", "duration": 60.0} if build is track_engine else "circle", "all", arena, fields, 1
-    )
+    definition = find_task(task)
+    engine, _ = build_engine(definition, robot, definition.short_path, "all", arena, fields, 1)
     assert compilation.of_restart(types_of_restart(engine)).what == words
 
 
@@ -47,7 +48,7 @@ def test_more_casters_and_obstacles_take_longer():
     robots = [load_robot(name) for name in ("chung2008", "xr4000")]
     path = {"shape": "circle", "duration": 60.0}
     seconds = [
-        compilation.of_restart(types_of_restart(track_engine(robot, path, "all", arena, {}, 1)[0])).seconds
+        compilation.of_restart(types_of_restart(build_engine(TRACK, robot, path, "all", arena, {}, 1)[0])).seconds
         for arena in (None, FAR)
         for robot in robots
     ]

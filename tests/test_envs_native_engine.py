@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model, load_robot
 from caster_gym.arena.arena import read_arena
 from caster_gym.arena.clearance import distances
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.mechanics.parameters import CasterParameters, PlatformParameters, pack_parameters, robot_parameters
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
 ARENA = {

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicHermiteSpline
 
 from caster_gym.agents.control.computed_torque import ComputedTorque
-from caster_gym.envs.caster_follow import CasterFollowEnv
+from caster_gym.tasks.follow.environment import CasterFollowEnv
 
 CIRCLE = {"shape": "circle", "radius": 0.5, "heading": "tangent"}
 EXACT_START = {"start_offset": 0.0, "start_turn": 0.0}

@@ -10,11 +10,11 @@ from gymnasium.wrappers import TimeLimit
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.engines.numpy_model import Model
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.envs.starts import check_motion
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from caster_gym.robot import load_robot
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, Payload, SensorNoise, wrap
 
 POOL = {"path": [{"shape": "circle", "radius": 0.5}, "lemniscate"]}

@@ -9,12 +9,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.envs import tracking
-from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.tracking import Record, Reference, Situation
+from caster_gym.envs.tracking import Reference, Situation
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
+from caster_gym.tasks.track import TASK
+from caster_gym.tasks.track.environment import CasterTrackEnv
+from tests.moments import untouched, weights_of
 from tests.random_robots import random_robot
 
 PATH = {"shape": "circle", "radius": 0.3, "heading": "tangent", "duration": 24.0}  # 1200 steps
@@ -219,7 +221,7 @@ def test_reward_is_what_the_documentation_says(moments):
 def test_plain_python_gives_what_the_compiled_code_delivers(moments):
     """The same lines on Python floats, to the last bit: one source, and strict arithmetic."""
     for m in moments:
-        parameters, weights = robot_parameters(m.env.robot), m.env.task.weights()
+        parameters = robot_parameters(m.env.robot)
         state = unpack_state(tuple(map(float, m.state)))
         reference = Reference(*map(float, m.reference))
         points = tuple(tuple(map(float, row[:7])) for row in m.coming)
@@ -230,10 +232,11 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         assert_array_equal(np.array(observation, dtype=np.float32), m.observation)
         torques = pairs(tuple(map(float, m.info["torque"])))
         record = untouched(m.info["power"])
-        ended = tracking.endings(state, errors, record, weights.corridor, weights.touching_ends)
-        terms = tracking.reward_terms(errors, tracking.mean_effort(torques, parameters), record, 0.0, weights)
-        assert terms._asdict() == m.info["reward_terms"]
         situation = Situation(0.0, 0.0, np.inf)
+        effort = tracking.mean_effort(torques, parameters)
+        moment, weights = tracking.Moment(state, reference, errors, effort, record, situation), weights_of(TASK)
+        ended, terms = tracking.endings(moment, weights), TASK.reward(moment, weights)
+        assert terms._asdict() == m.info["reward_terms"]
         report = tracking.report(state, reference, errors, record, situation, ended, terms, parameters)
         assert report.position_error == m.info["position_error"]
         assert report.conditioning == m.info["conditioning"]
@@ -249,8 +252,3 @@ def test_without_obstacles_nothing_touches(moments):
         assert_array_equal(m.info["impulse"], [0.0, 0.0])
         assert m.info["clearance"] == np.inf
         assert (m.info["progress"], m.info["progress_share"]) == (0.0, 0.0)
-
-
-def untouched(power=0.0):
-    """The record of a control period without impacts."""
-    return Record(*(0.0,) * len(Record._fields))._replace(power=power)

@@ -1,4 +1,4 @@
-"""caster_gym.envs.caster_track: the native batch equals Gymnasium's SyncVectorEnv of single environments."""
+"""caster_gym.tasks.track.environment: the native batch equals Gymnasium's SyncVectorEnv of single environments."""
 
 import copy
 
@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from caster_gym.engines.native.lanes import LANES
 from caster_gym.engines.native.threads import BLOCKS_PER_SHARE, get_threads, set_threads
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 
 TASK = {"corridor": 0.12, "path": {"shape": "circle", "radius": 0.5}}  # random torques leave it, sooner or later
 LONGEST = 40

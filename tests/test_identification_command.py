@@ -8,7 +8,6 @@ import pytest
 import yaml
 
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackEnv
 from caster_gym.identification.command import (
     PAYLOAD,
     features_yaml,
@@ -25,6 +24,7 @@ from caster_gym.identification.recording import read_recording
 from caster_gym.identification.recording_check import ContradictionError
 from caster_gym.identification.unknowns import unknowns
 from caster_gym.robot import load_robot
+from caster_gym.tasks.track.environment import CasterTrackEnv
 from caster_gym.wrappers import read_features, wrap
 
 FILES = [".caster-gym", "features.yaml", "identified.csv", "identified.md", "identified.png", "robot.yaml", "run.yaml"]

@@ -10,10 +10,10 @@ import yaml
 
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.comparison.track_metrics import TrackVerdict
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import make_learner
 from caster_gym.configuration import parse
+from caster_gym.tasks.track.metrics import TrackVerdict
 from scripts import measure_training
 from scripts.measure_training import (
     FREE,

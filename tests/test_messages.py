@@ -17,8 +17,8 @@ import caster_gym
 import caster_gym.agents
 from caster_gym.agents.commands.cli import app
 from caster_gym.configuration import Frozen
-from caster_gym.envs.caster_follow import CasterFollowEnv
-from caster_gym.envs.caster_track import CasterTrackEnv
+from caster_gym.tasks.follow.environment import CasterFollowEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv
 
 TESTS = Path(__file__).parent
 FOLDERS = {"caster_gym": Path(caster_gym.__path__[0]), "agents": Path(caster_gym.agents.__path__[0])}

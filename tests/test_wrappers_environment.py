@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import RescaleAction, TimeLimit
 from numpy.testing import assert_array_equal
 
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import (
     ActionDelay,
     FeatureEnv,

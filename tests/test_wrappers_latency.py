@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from caster_gym import Model
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, MotorLag, read_features, wrap
 
 PATH = {"shape": "circle", "radius": 0.5}

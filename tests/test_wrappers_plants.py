@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model, load_robot
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
     PLATFORM_FIELDS,
@@ -17,6 +16,7 @@ from caster_gym.mechanics.parameters import (
     pack_parameters,
     robot_parameters,
 )
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.wrappers import Friction, Payload, WheelErrors, read_features, wrap
 
 PATH = {"shape": "circle", "radius": 0.5}

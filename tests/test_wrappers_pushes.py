@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import Model
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.wrappers import Pushes, read_features, wrap
 
 PATH = {"shape": "circle", "radius": 0.5}

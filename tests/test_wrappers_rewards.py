@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs.caster_track import CasterTrackEnv, CasterTrackVectorEnv
+from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import (
     Effort,
     Impact,

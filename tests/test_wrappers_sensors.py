@@ -7,12 +7,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs import tracking
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.tracking import Reference, observe, tracking_errors
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.paths import build_trajectories
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.wrappers import SensorNoise, SteeringOffset, read_features, wrap
 
 PATH = {"shape": "ellipse", "duration": 20.0, "heading": {"kind": "spinning", "turns": 2.0}}

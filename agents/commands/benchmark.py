@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator
 
 from caster_gym.agents.comparison.evaluation import bare, test_batch
-from caster_gym.agents.comparison.metrics import yardstick
 from caster_gym.agents.comparison.results import Contender, compare, write_results
 from caster_gym.agents.comparison.task_settings import Seed, TaskSettings
 from caster_gym.agents.comparison.validation import read_history, tune
@@ -112,7 +111,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
     ]
     with limit_threads(threads):
         compared = compare(contenders, test, settings.start_seed, settings.settling)
-    verdict = yardstick(bare(test).task).verdict
+    verdict = bare(test).definition.metrics.verdict
     histories = {job.name: read_history(job.folder / "validation.csv", verdict) for job in jobs}
     text = write_results(folder, compared, test, settings.confidence, histories)
     write_provenance(

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,16 +13,12 @@ from caster_gym.arena.arena import Arena
 from caster_gym.engines.native.compilation import compilations, included
 from caster_gym.engines.native.compiled_files import roots, version
 from caster_gym.engines.native.fleet import Fleet
-from caster_gym.envs.setup import follow_engine, track_engine
 from caster_gym.robot import Robot, load_robot
 from caster_gym.shipped_files import read_settings
+from caster_gym.tasks.building import build_engine
+from caster_gym.tasks.registry import find_task
 
 _FAR = Arena(room=((-100.0, -100.0), (100.0, 100.0)))  # what obstacles there are makes no difference, nor where
-_ENGINES = {"track": track_engine, "follow": follow_engine}
-_PATHS: dict[str, dict[str, Any]] = {
-    "track": {"shape": "circle", "radius": 0.5, "duration": 60.0},
-    "follow": {"shape": "circle", "radius": 0.5},
-}
 
 
 class Piece(NamedTuple):
@@ -98,8 +94,8 @@ def _of_task(robot: Robot, task: ChosenTask) -> list[Piece]:
 
 def _step_task(robot: Robot, task: ChosenTask, arena: Arena | None, count: int) -> None:
     fields = task.task.model_dump(exclude_defaults=True)
-    build, path = _ENGINES[task.environment], _PATHS[task.environment]
-    engine, _ = build(robot, path, "all", arena, fields, count)
+    definition = find_task(task.environment)
+    engine, _ = build_engine(definition, robot, definition.short_path, "all", arena, fields, count)
     engine.restart(np.arange(count))
     action = np.zeros((count, len(engine.robot.driven)), dtype=np.float32)
     if count == 1:

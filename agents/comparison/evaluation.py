@@ -1,6 +1,6 @@
 """Batches of robots for training and for evaluation, and episodes of an agent on given paths and starts."""
 
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import TypeAlias, cast
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -9,21 +9,12 @@ from numpy.typing import NDArray
 from caster_gym.agents.comparison.task_settings import Paths, TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.arrays import Array
-from caster_gym.envs.caster_follow import CasterFollowVectorEnv
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv
-from caster_gym.envs.native.reference import Courses
-from caster_gym.envs.plan import Plan
-from caster_gym.paths.time_law import row_times
+from caster_gym.tasks.environment import TaskVectorEnv
+from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.registry import find_task
 from caster_gym.wrappers import Feature, FeatureVectorEnv, wrap
 
-Batch: TypeAlias = CasterVectorEnv | FeatureVectorEnv
-
-_BATCHES: dict[str, type[CasterTrackVectorEnv | CasterFollowVectorEnv]] = {
-    "track": CasterTrackVectorEnv,
-    "follow": CasterFollowVectorEnv,
-}
-
+Batch: TypeAlias = TaskVectorEnv | FeatureVectorEnv
 
 _AS_TOLD = (
     "position_error",
@@ -37,40 +28,16 @@ _AS_TOLD = (
 )  # by info, under the same names
 
 
-class Episodes(NamedTuple):
-    """Time series of episodes (steps, episodes, …), NaN after an episode has ended; and facts of each (episodes,)."""
-
-    names: tuple[str, ...]  # of the path of each episode
-    period: float  # [s]
-    position_error: Array  # [m]
-    heading_error: Array  # [rad]
-    torque: Array  # (steps, episodes, 2 N) of the motors [N m]
-    share: Array  # the same as shares of their greatest torques
-    command: Array  # (steps, episodes, driven motors) shares asked for, in −1 … 1; of wrapped robots, those given
-    pose: Array  # (steps, episodes, 4): x, y, cos β, sin β in W
-    reference: Array  # the same of the reference
-    reward: Array  # of the task alone
-    progress: Array  # [m]
-    impacts: Array  # in each control period
-    normal_impulse: Array  # [N s] likewise
-    clearance: Array  # [m] inf where there is no obstacle
-    driven: list[int]  # indices of the driven motors
-    failed: NDArray[np.bool_]  # (episodes,)
-    allowed: NDArray[np.int64]  # (episodes,) control periods of an episode that does not fail
-    goal: Array  # (episodes,) [m] progress with which the path is done; NaN where a clock leads
-    law: Array  # (episodes,) [s] that the time law takes; NaN likewise
-
-
-def bare(batch: Batch) -> CasterVectorEnv:
+def bare(batch: Batch) -> TaskVectorEnv:
     """The batch without its features: it has the engine, the task and the robot."""
-    return cast(CasterVectorEnv, batch.unwrapped)
+    return cast(TaskVectorEnv, batch.unwrapped)
 
 
 def make_batch(
     settings: TaskSettings, paths: Paths, count: int, mode: AutoresetMode, features: tuple[Feature, ...] = ()
 ) -> Batch:
     """So many robots on these paths, with these features."""
-    batch = _BATCHES[settings.environment](
+    batch = find_task(settings.environment).batch(
         count,
         settings.robot,
         paths,
@@ -120,7 +87,6 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
         rows.append({name: np.where(_beside(running, one), one, np.nan) for name, one in row.items()})
         failed |= running & terminated
         running &= ~(terminated | truncated)
-    goals, laws = _goals(plan)
     return Episodes(
         tuple(plan.names[i] for i in path),
         plain.task.control_period,
@@ -128,21 +94,10 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
         driven=driven,
         failed=failed,
         allowed=plan.guide.spans[path, 2],
-        goal=goals[path],
-        law=laws[path],
+        facts={name: values[path] for name, values in plain.definition.facts(plan).items()},
     )
 
 
 def _beside(running: NDArray[np.bool_], values: Array) -> NDArray[np.bool_]:
     """Flags (robots,) in a shape that goes with values (robots, …)."""
     return running.reshape(-1, *[1] * (values.ndim - 1))
-
-
-def _goals(plan: Plan) -> tuple[Array, Array]:
-    """Of each path, progress with which it is done [m] and time of its law [s]; NaN where a clock leads."""
-    guide: Any = plan.guide
-    if not isinstance(guide, Courses):
-        return np.full(len(plan.names), np.nan), np.full(len(plan.names), np.nan)
-    lengths = (guide.spans[:, 1] - guide.spans[:, 0]) * guide.spacings
-    laws = [row_times(table[:, -1], spacing)[-1] for table, spacing in zip(plan.tables, guide.spacings, strict=True)]
-    return lengths - guide.arrival, np.array(laws)

@@ -1,17 +1,18 @@
 """Pictures of a comparison: paths driven, errors over time, speeds, torques, and how the policies learned."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.agents.comparison.evaluation import Episodes
-from caster_gym.agents.comparison.measuring import Printed, shown
 from caster_gym.agents.comparison.validation import Validation
-from caster_gym.envs.native.reference import Courses
 from caster_gym.envs.plan import Plan
 from caster_gym.report.figures import COLOURS, legend_below, new_figure
+from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.measuring import Printed, shown
+from caster_gym.tasks.task import Pictures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,24 +20,29 @@ if TYPE_CHECKING:
 
 OBSTACLE = "0.75"
 MOST_PATHS = 6
-MAGNIFIED = 20.0  # how much larger tracking errors are drawn
+TRANSIENT = 2.0  # [s] from which on errors are drawn larger
 
 
 def write_figures(
-    folder: Path, episodes: Mapping[str, Episodes], histories: Mapping[str, Sequence[Validation]], plan: Plan
+    folder: Path,
+    episodes: Mapping[str, Episodes],
+    histories: Mapping[str, Sequence[Validation]],
+    plan: Plan,
+    pictures: Pictures,
 ) -> list[Path]:
     """Pictures of the episodes of a plan, by agent, and of what was learned, if anything; returns their paths.
 
-    paths.png, errors.png, torques.png, learning.png and overview.png; speeds.png of paths that are followed at the
-    robot's own pace.
+    paths.png, errors.png, torques.png, learning.png and overview.png; speeds.png where the task shows speeds.
     """
     colours = dict(zip(episodes, COLOURS * (1 + len(episodes) // len(COLOURS)), strict=False))
     chosen = _telling_episodes(next(iter(episodes.values())).names)
-    own_pace = isinstance(plan.guide, Courses)
     curves = learning_curves(histories)
     figures: dict[str, Figure] = {}
 
-    for kind, draw in {"paths": draw_path, **({"speeds": draw_speeds} if own_pace else {})}.items():
+    drawn: dict[str, Callable[..., None]] = {"paths": partial(draw_path, pictures=pictures)}
+    if pictures.speeds:
+        drawn["speeds"] = draw_speeds
+    for kind, draw in drawn.items():
         figure = figures[kind] = new_figure(2, 3, (4.0, 4.0))
         for axis, index in zip(figure.axes, chosen, strict=False):
             draw(axis, episodes, index, colours, plan)
@@ -65,8 +71,8 @@ def write_figures(
 
     figure = figures["overview"] = new_figure(1, 3 if curves else 2, (5.4, 4.6))
     left, middle, *right = figure.axes
-    draw_path(left, episodes, chosen[-1], colours, plan)
-    if own_pace:
+    draw_path(left, episodes, chosen[-1], colours, plan, pictures)
+    if pictures.speeds:
         draw_speeds(middle, episodes, chosen[-1], colours, plan)
     else:
         draw_errors(middle, episodes, "position_error", 1e3, "position error [mm]", colours)
@@ -83,23 +89,24 @@ def write_figures(
 
 
 def draw_path(
-    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+    axis: "Axes",
+    episodes: Mapping[str, Episodes],
+    index: int,
+    colours: Mapping[str, str],
+    plan: Plan,
+    pictures: Pictures,
 ) -> None:
-    """What each agent drove in one episode, over its path and among its obstacles.
-
-    Against a timetable, errors are drawn twenty times as large.
-    """
+    """What each agent drove in one episode, over its path and among its obstacles, with errors as large as asked."""
     first = next(iter(episodes.values()))
     path = index % len(plan.names)
     table = plan.tables[path]
-    own_pace = isinstance(plan.guide, Courses)
+    larger = pictures.magnified
     draw_obstacles(axis, plan, path)
-    name = "path" if own_pace else "reference"
-    axis.plot(table[:, 0], table[:, 1], color="0.6", linewidth=4, label=name, solid_capstyle="round")
+    axis.plot(table[:, 0], table[:, 1], color="0.6", linewidth=4, label=pictures.path, solid_capstyle="round")
     for agent, series in episodes.items():
         driven, asked = series.pose[:, index, :2], series.reference[:, index, :2]
-        if not own_pace:
-            driven = (asked + MAGNIFIED * (driven - asked))[round(2.0 / series.period) :]
+        if larger != 1.0:
+            driven = (asked + larger * (driven - asked))[round(TRANSIENT / series.period) :]
         axis.plot(driven[:, 0], driven[:, 1], color=colours[agent], linewidth=1.2, label=agent)
     axis.plot(*table[0, :2], "o", color="black", markersize=5)
     low, high = table[:, :2].min(axis=0), table[:, :2].max(axis=0)
@@ -107,7 +114,7 @@ def draw_path(
     axis.set_xlim(centre[0] - reach, centre[0] + reach)
     axis.set_ylim(centre[1] - reach, centre[1] + reach)
     axis.set_aspect("equal")
-    remark = "" if own_pace else f", errors × {MAGNIFIED:g} after 2 s"
+    remark = "" if larger == 1.0 else f", errors × {larger:g} after {TRANSIENT:g} s"
     axis.set_title(f"{first.names[index]}{remark}", fontsize="medium")
     axis.set_xlabel("x [m]")
     axis.set_ylabel("y [m]")
@@ -131,11 +138,14 @@ def draw_obstacles(axis: "Axes", plan: Plan, path: int) -> None:
 
 
 def draw_speeds(
-    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
+    axis: "Axes",
+    episodes: Mapping[str, Episodes],
+    index: int,
+    colours: Mapping[str, str],
+    plan: Plan,
 ) -> None:
     """Speed along the path in one episode over the way, beside that of the time law."""
     path = index % len(plan.names)
-    assert isinstance(plan.guide, Courses)
     square = plan.tables[path][:, -1]
     way = plan.guide.spacings[path] * np.arange(len(square))
     axis.plot(way, np.sqrt(square), color="0.6", linewidth=4, label="time law")

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 from tqdm import tqdm
 
-from caster_gym.agents.comparison.evaluation import Batch, Episodes, bare, roll_out
+from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
 from caster_gym.agents.comparison.figures import write_figures
-from caster_gym.agents.comparison.metrics import yardstick
 from caster_gym.agents.comparison.summary import Result, table, write_episodes, write_summary
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.protocol import Agent
@@ -34,7 +33,7 @@ def compare(contenders: Sequence[Contender], test: Batch, seed: int, settling: f
 
     settling [s]: what comes before counts as transient; None: as suits the task.
     """
-    how = yardstick(bare(test).task)
+    how = bare(test).definition.metrics
     settling = how.settling if settling is None else settling
     results: list[Result] = []
     shown: dict[str, Episodes] = {}
@@ -59,5 +58,5 @@ def write_results(
     write_episodes(folder / "episodes.csv", results)
     write_summary(folder / "summary.csv", results, confidence)
     (folder / "table.md").write_text(text + "\n", encoding="utf-8")
-    write_figures(folder, episodes, histories, bare(test).engine.plan)
+    write_figures(folder, episodes, histories, bare(test).engine.plan, bare(test).definition.pictures)
     return text

@@ -2,15 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import bootstrap
 
-from caster_gym.agents.comparison.measuring import Counted, Printed, shown
-from caster_gym.agents.comparison.metrics import Metrics
 from caster_gym.arrays import Array
 from caster_gym.report.tables import markdown_table, write_csv
+from caster_gym.tasks.measuring import Counted, Printed, shown
 
 RESAMPLES = 2000
 
@@ -21,7 +20,7 @@ class Result(NamedTuple):
     agent: str
     seed: int | None
     paths: tuple[str, ...]  # name of the path of each episode
-    metrics: Metrics
+    metrics: Any  # what the task's metrics measured
 
 
 class Estimate(NamedTuple):

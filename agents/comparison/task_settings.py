@@ -6,22 +6,22 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import (
     Field,
+    SerializeAsAny,
     ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.configuration import Frozen
-from caster_gym.envs.follow_task import FollowTask
-from caster_gym.envs.task import Task
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.robot import Robot, load_robot
+from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.registry import KNOWN, TASKS, all_tasks, find_task
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
@@ -29,13 +29,11 @@ from caster_gym.wrappers.specification import FeatureSpecification
 Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
-Environment: TypeAlias = Literal["track", "follow"]
 RewardSpecification: TypeAlias = Annotated[
     Potential | Tolerance | Effort | Smoothness | TractionUse | Impact, Field(discriminator="kind")
 ]
 
 SHOWN = 4  # of the items of a list in a message
-TASKS: dict[str, type[TrackTask | FollowTask]] = {"track": TrackTask, "follow": FollowTask}
 
 
 def _usual_names(parameters: set[str]) -> dict[str, str]:
@@ -43,7 +41,7 @@ def _usual_names(parameters: set[str]) -> dict[str, str]:
     inside = {name: f"write it inside of 'task', as task: {{{name}: …}}" for name in parameters}
     usual = {
         name: f"write it inside of 'task', as task: {{{here}: …}}"
-        for name, here in Task.usual_names.items()
+        for name, here in TaskParameters.usual_names.items()
         if here in parameters
     }
     return {
@@ -53,7 +51,7 @@ def _usual_names(parameters: set[str]) -> dict[str, str]:
         "env_id": "environment",
         "path": "the paths are those of 'train', 'validation' and 'test'",
         "paths": "the paths are those of 'train', 'validation' and 'test'",
-        "max_episode_steps": Task.usual_names["max_episode_steps"],
+        "max_episode_steps": TaskParameters.usual_names["max_episode_steps"],
         "seed": "random paths have a 'seed' of their own, and training runs are given one by --seed",
         "n_envs": "the number of robots is set by 'robots' of an agent",
         "num_envs": "the number of robots is set by 'robots' of an agent",
@@ -67,19 +65,28 @@ def _usual_names(parameters: set[str]) -> dict[str, str]:
 class ChosenTask(Frozen):
     """One of the environments, with the parameters of its task."""
 
-    environment: Environment = "track"  # CasterTrack-v0 or CasterFollow-v0
-    task: TrackTask | FollowTask = Field(default={}, validate_default=True)
+    environment: str = "track"  # a task by its name, or module:Name of one's own
+    task: SerializeAsAny[TaskParameters] = Field(default={}, validate_default=True)
+
+    @field_validator("environment")
+    @classmethod
+    def _is_a_task(cls, environment: str) -> str:
+        if environment not in TASKS and ":" not in environment:
+            raise PydanticCustomError("misread", "should be {kind}", {"kind": KNOWN})
+        find_task(environment)
+        return environment
 
     @field_validator("task", mode="before")
     @classmethod
     def _of_its_environment(cls, task: Any, info: ValidationInfo) -> Any:
         environment = info.data.get("environment", "track")
-        kind = TASKS[environment]
+        kind = find_task(environment).parameters
         if isinstance(task, Mapping):
-            for other, model in TASKS.items():
-                if misplaced := sorted(task.keys() & (model.model_fields.keys() - kind.model_fields.keys())):
+            for other in all_tasks():
+                known = other.parameters.model_fields.keys() - kind.model_fields.keys()
+                if misplaced := sorted(task.keys() & known):
                     raise ValueError(
-                        f"{misplaced[0]!r} is for environment {other!r}, got it with environment {environment!r}"
+                        f"{misplaced[0]!r} is for environment {other.name!r}, got it with environment {environment!r}"
                     )
             if unknown := [key for key in task if key not in kind.model_fields]:  # refused for this kind of task alone
                 problems = [
@@ -88,7 +95,7 @@ class ChosenTask(Frozen):
                 ]
                 raise ValidationError.from_exception_data(kind.__name__, problems)
             return kind.model_validate(task)
-        if isinstance(task, Task) and not isinstance(task, kind):
+        if isinstance(task, TaskParameters) and not isinstance(task, kind):
             raise ValueError(f"must be a {kind.__name__} in environment {environment!r}, got a {type(task).__name__}")
         return task
 
@@ -97,7 +104,7 @@ class TaskSettings(ChosenTask):
     """A robot, its task, and the paths to train, to choose and to test on."""
 
     usual_names: ClassVar[Mapping[str, str]] = _usual_names(
-        {name for kind in TASKS.values() for name in kind.model_fields}
+        {name for task in all_tasks() for name in task.parameters.model_fields}
     )
 
     robot: Robot | NameOrFile = "chung2008"  # a mapping as in configs/robots, the name of a file there, or path of one

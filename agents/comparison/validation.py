@@ -3,13 +3,10 @@
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
-from caster_gym.agents.comparison.follow_metrics import FollowVerdict
-from caster_gym.agents.comparison.metrics import Verdict, yardstick
 from caster_gym.agents.comparison.task_settings import in_brief
-from caster_gym.agents.comparison.track_metrics import TrackVerdict
 from caster_gym.agents.control.protocol import Agent, ControllerSettings
 from caster_gym.report.tables import write_csv
 
@@ -21,7 +18,7 @@ class Validation(NamedTuple):
 
     steps: int
     seconds: float  # of training so far, validations left out
-    verdict: Verdict
+    verdict: Any  # of the task's metrics
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -36,11 +33,10 @@ class Tuned(NamedTuple):
     settings: ControllerSettings
 
 
-def verdict_on(agent: Agent, validation: Batch) -> Verdict:
+def verdict_on(agent: Agent, validation: Batch) -> Any:
     """How good an agent is on a batch of validation paths, always from the same starts."""
-    how = yardstick(bare(validation).task)
-    verdict: Verdict = how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
-    return verdict
+    how = bare(validation).definition.metrics
+    return how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
 
 
 def tune(settings: ControllerSettings, validation: Batch) -> Tuned:
@@ -61,7 +57,7 @@ def write_history(path: Path, history: Sequence[Validation]) -> None:
     write_csv(path, history[0].numbers, (result.numbers.values() for result in history))
 
 
-def read_history(path: Path, verdict: type[TrackVerdict] | type[FollowVerdict]) -> list[Validation]:
+def read_history(path: Path, verdict: Any) -> list[Validation]:
     """The validations of a training run on a task with these verdicts."""
     with path.open(newline="", encoding="utf-8") as file:
         return [

@@ -14,23 +14,23 @@ import numpy as np
 import torch
 import yaml
 from numpy.typing import NDArray
-from pydantic import PositiveInt
+from pydantic import PositiveInt, SerializeAsAny
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
 from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
-from caster_gym.envs.follow_task import FollowTask
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import Robot
+from caster_gym.tasks.building import observation_layout
+from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.registry import all_tasks, find_task
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.specification import FeatureSpecification
 
 FORMAT = 1
 SHOWN = 3  # of the policies that a message may name
-UNITS: dict[str, Literal["s", "m"]] = {"track": "s", "follow": "m"}  # of each environment's preview
 DESCRIPTION, WEIGHTS = "policy.yaml", "weights.safetensors"
 
 
@@ -42,7 +42,7 @@ class PolicyDescription(ChosenTask):
     squash: Squash
     hidden: tuple[PositiveInt, ...]
     robot: Robot
-    task: TrackTask | FollowTask
+    task: SerializeAsAny[TaskParameters]
     wrappers: tuple[FeatureSpecification, ...] = ()  # features of the environment that it acts in
     actions: PositiveInt | None = None  # None: one for each driven joint
     trained_with: dict[str, Any]  # settings, seed, steps
@@ -51,8 +51,7 @@ class PolicyDescription(ChosenTask):
     @property
     def layout(self) -> ObservationLayout:
         """What the policy's observations mean."""
-        unit = UNITS[self.environment]
-        return ObservationLayout(self.robot, self.task.preview, unit, self.task.nearest)
+        return observation_layout(find_task(self.environment), self.robot, self.task)
 
 
 class Bundle:
@@ -105,7 +104,7 @@ class Bundle:
                 f"the policy acts every {self.description.task.control_period:g} s, the task every {period:g} s"
             )
         if ours.unit != layout.unit:
-            learned, asked = (_TOLD[unit] for unit in (ours.unit, layout.unit))
+            learned, asked = (_purpose(unit) for unit in (ours.unit, layout.unit))
             raise ValueError(f"the policy has learned to {learned}, the task is to {asked}")
         if ours.preview != layout.preview:
             raise ValueError(
@@ -120,7 +119,10 @@ class Bundle:
             raise ValueError(f"the policy's actions are {_named(meant)}, the task takes {_named(understood)}")
 
 
-_TOLD = {"s": "follow a timetable (environment 'track')", "m": "follow a path at its own pace (environment 'follow')"}
+def _purpose(unit: str) -> str:
+    """What the first task is for whose previews have that unit."""
+    task = next(one for one in all_tasks() if one.preview_unit == unit)
+    return f"{task.purpose} (environment {task.name!r})"
 
 
 def _named(features: Sequence[Feature]) -> str:

@@ -8,14 +8,14 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+from caster_gym.configuration import Frozen
 from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.infos import named
 from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, TaskEngine
-from caster_gym.envs.setup import action_space, observation_space
+from caster_gym.envs.spaces import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
-from caster_gym.envs.task import Task
 
 Observation = NDArray[np.float32]
 _ONLY, _CHOSEN = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.bool_)
@@ -30,14 +30,16 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
     # Gymnasium declares it for instances, so that mypy refuses the ClassVar which RUF012 asks for
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 
-    def __init__(self, engine: TaskEngine, task: Task, render_mode: str | None) -> None:
+    task: Frozen  # parameters
+
+    def __init__(self, engine: TaskEngine, task: Frozen, render_mode: str | None) -> None:
         self.engine, self.task, self.robot = engine, task, engine.robot
         self.path_descriptions = engine.plan.descriptions  # what was made of each path of the pool
         self.observation_space = observation_space(engine)
         self.action_space = action_space(engine)
         self._action_shape, self._terms, self._slipping = self.action_space.shape, engine.plan.terms, engine.slipping
         self.render_mode = checked_mode(render_mode, self.metadata)
-        self.metadata = {**type(self).metadata, "render_fps": round(1.0 / task.control_period)}
+        self.metadata = {**type(self).metadata, "render_fps": round(1.0 / engine.control_period)}
         self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
         self._started = False
         self._spec: EnvSpec | None = None

@@ -13,13 +13,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from caster_gym.arrays import Flags
+from caster_gym.configuration import Frozen
 from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.inputs import Seeds, checked_mask, checked_seeds, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
-from caster_gym.envs.setup import action_space, observation_space
+from caster_gym.envs.spaces import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
-from caster_gym.envs.task import Task
 
 Observations = NDArray[np.float32]
 
@@ -43,8 +43,10 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
+    task: Frozen  # parameters
+
     def __init__(
-        self, engine: TaskEngine, task: Task, autoreset_mode: AutoresetMode | str, render_mode: str | None
+        self, engine: TaskEngine, task: Frozen, autoreset_mode: AutoresetMode | str, render_mode: str | None
     ) -> None:
         super().__init__()
         self.num_envs = engine.count
@@ -55,7 +57,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.metadata = {
             **type(self).metadata,
             "autoreset_mode": self.autoreset_mode,
-            "render_fps": round(1.0 / task.control_period),
+            "render_fps": round(1.0 / engine.control_period),
         }
         self._renderer = Renderer(engine, self.render_mode, self.metadata["render_fps"])
         self.single_observation_space = observation_space(engine)

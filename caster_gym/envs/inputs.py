@@ -5,18 +5,25 @@ Whatever cannot be used is refused with a sentence before anything has changed.
 
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.arena.arena import Arena
 from caster_gym.configuration import ConfigurationError, did_you_mean
+from caster_gym.robot import Robot
 
 
 class UnexpectedKeywordError(ConfigurationError, TypeError):
     """A keyword that a constructor does not know: a TypeError as Python's own, and a setting that does not exist."""
 
 
+RobotLike: TypeAlias = str | Path | Robot | Mapping[str, Any]
+ArenaLike: TypeAlias = str | Path | Mapping[str, Any] | Arena | None
+Actuation: TypeAlias = str | list[str] | tuple[str, ...] | None
 Seeds: TypeAlias = int | Sequence[int | None] | NDArray[np.integer] | None
 
 FLOAT32 = np.dtype(np.float32)
@@ -96,10 +103,12 @@ def read_actions(actions: Any, shape: tuple[int, ...] | None, name: str = "actio
         return np.array(given, dtype=np.float32, order="C")
 
 
-def checked_options(options: Any, known: Iterable[str], elsewhere: str = "", here: str = "") -> Mapping[str, Any]:
+def checked_options(
+    options: Any, known: Iterable[str], elsewhere: Mapping[str, str] = MappingProxyType({})
+) -> Mapping[str, Any]:
     """The options of a reset. Raises ValueError for unknown ones.
 
-    elsewhere: an option that only other environments know, and `here` what takes its place.
+    elsewhere: options that other environments know, and what takes their place, in words.
     """
     if options is None:
         return {}
@@ -107,8 +116,8 @@ def checked_options(options: Any, known: Iterable[str], elsewhere: str = "", her
         raise ValueError(f"options must be None or a mapping of names to values, got {options!r}")
     for name in options:
         if name not in known:
-            hint = did_you_mean(name, [*known, elsewhere])
-            hint = f"here the place along the path is {here}" if repr(elsewhere) in hint else did_you_mean(name, known)
+            hint = did_you_mean(name, [*known, *elsewhere])
+            hint = next((words for other, words in elsewhere.items() if repr(other) in hint), did_you_mean(name, known))
             raise ValueError(f"reset knows no option {name!r}; {hint}")
     return options
 

@@ -1,20 +1,49 @@
 """What a task asks of its robots, prepared for the compiled step: paths, rewards, obstacles and pace."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Protocol, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs.native.reference import Courses, Timetable
 from caster_gym.floor import Floor
 from caster_gym.mechanics.separation import Surroundings
+
+PlaceName: TypeAlias = Literal["time", "progress"]
+
+
+class ReferenceSource(Protocol):
+    """Where references come from: a named tuple of arrays that compiled code reads, with `weights` behind all others.
+
+    place: how a place along a path is given at a reset: the time [s] of a clock, or the progress [m] that the task
+    measures along rows which are `spacings` [m] apart; None where there are no places. `on_tensors(dtype, device)`
+    makes the same for a batch of tensors, see `caster_gym.envs.tensor.reference`.
+    """
+
+    @property
+    def place(self) -> PlaceName | None:
+        """See above."""
+        ...
+
+    @property
+    def spans(self) -> NDArray[np.int64]:
+        """(paths, 3): first and last row, control periods of an episode."""
+        ...
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Numbers of the reward, taken apart in every call: an array costs less than its numbers."""
+        ...
+
+    def still(self) -> Self:
+        """The same under which progress stays, wherever the robot is."""
+        ...
 
 
 class Plan(NamedTuple):
     """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
 
-    guide: Timetable | Courses
+    guide: Any  # ReferenceSource
     names: tuple[str, ...]  # of the paths
     tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
     terms: tuple[str, ...]  # names of the reward's terms

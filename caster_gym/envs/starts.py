@@ -17,7 +17,7 @@ from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.native.layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
-from caster_gym.envs.native.reference import Courses
+from caster_gym.envs.plan import PlaceName
 from caster_gym.envs.randomness import episode_seed, uniforms
 from caster_gym.envs.tracking import Reference, start
 from caster_gym.mechanics.integration import pack_state, unpack_state
@@ -44,31 +44,27 @@ class Start(NamedTuple):
 
 
 DRAWN = Start(None, None, None, None)
-_PLACES = {"progress": "metres along the path", "time": "seconds along the trajectory"}
+_PLACES: dict[PlaceName, str] = {"progress": "metres along the path", "time": "seconds along the trajectory"}
 
 
 def read_options(options: Any, engine: TaskEngine, *others: str) -> Mapping[str, Any]:
     """The options of a reset of these robots, which may have others beside those of a start."""
-    place, elsewhere = _place_names(engine)
-    known = (*others, "path", place, "pose", "twist", "steering")
-    return checked_options(options, known, elsewhere, f"{place!r}, in {_PLACES[place]}")
-
-
-def _place_names(engine: TaskEngine) -> tuple[str, str]:
-    """What the place along the path is called: "progress" where the robot sets the pace, else "time"; and the other."""
-    return ("progress", "time") if isinstance(engine.plan.guide, Courses) else ("time", "progress")
+    place: PlaceName | None = engine.plan.guide.place
+    known = (*others, "path", *([place] if place else []), "pose", "twist", "steering")
+    here = f"here the place along the path is {place!r}, in {_PLACES[place]}" if place else ""
+    return checked_options(options, known, {name: here for name in _PLACES if place and name != place})
 
 
 def read_start(options: Mapping[str, Any], engine: TaskEngine, chosen: NDArray[np.bool_]) -> Start:
     """The start that options ask for of the chosen ones (robots,). Raises ValueError for what can be no start."""
-    place, _ = _place_names(engine)
-    meanings = {
-        place: (None, _PLACES[place]),
+    place: PlaceName | None = engine.plan.guide.place
+    meanings: dict[str, tuple[int | None, str]] = {
+        **({place: (None, _PLACES[place])} if place else {}),
         "pose": (3, "x, y [m] and heading [rad] in the world frame"),
         "twist": (3, "vx, vy [m/s] and yaw rate [rad/s] in the body frame"),
         "steering": (engine.robot.caster_count, "the steering angle [rad] of each caster"),
     }
-    parts: dict[str, Array | None] = dict.fromkeys(meanings)
+    parts: dict[str | None, Array | None] = dict.fromkeys((place, *meanings))
     for name, (width, meaning) in meanings.items():
         if name in options:
             rows = checked_numbers(name, options[name], len(chosen), width, meaning)[chosen]
@@ -122,7 +118,7 @@ def _put(engine: TaskEngine, selected: NDArray[np.int64], wanted: Start) -> None
     if engine.slipping:
         states[:, end:] = rolling(states[:, :end], engine.parameters[selected])
     engine.put(selected, states)
-    if wanted.pose is not None and wanted.place is None and isinstance(engine.plan.guide, Courses):
+    if wanted.pose is not None and wanted.place is None and engine.plan.guide.place == "progress":
         _find_place(engine, selected, wanted.pose[:, :2])
 
 
@@ -138,7 +134,7 @@ def rolling(states: Array, parameters: Array) -> Array:
 def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -> None:
     """Move clocks or progress to a place along each robot's path."""
     place = check_place(engine, engine.paths[selected], place)
-    if isinstance(engine.plan.guide, Courses):
+    if engine.plan.guide.place == "progress":
         engine.put(selected, progress=place)
     else:
         engine.put(selected, clocks=np.rint(place / engine.control_period).astype(np.int64))
@@ -147,9 +143,9 @@ def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -
 def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> Array:
     """Places (robots,) on paths (robots,), in range in spite of rounding. Raises ValueError for ones that are not."""
     guide: Any = engine.plan.guide
-    (name, _), unit, rows = _place_names(engine), "s", guide.spans[paths, 1] - guide.spans[paths, 0]
+    name, unit, rows = guide.place, "s", guide.spans[paths, 1] - guide.spans[paths, 0]
     most = (rows - 1) * engine.control_period  # at least one control period is left
-    if isinstance(guide, Courses):
+    if name == "progress":
         unit, most = "m", rows * guide.spacings[paths]
     bad = (place < 0.0) | (place > most * _BY_ROUNDING)
     if bad.any():

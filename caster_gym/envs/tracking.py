@@ -1,11 +1,11 @@
-"""Tracking a reference, on generic scalars: errors, observation, report, and the reward of a timed trajectory.
+"""Tracking a reference, on generic scalars: errors, endings, observation, report, and kernels of rewards.
 
 Like the mechanics, this is written once: the single environment and the batch compile the same lines. Quantities with
 suffix _W are in the world frame, all others in the body frame B. Rational kernels 1 / (1 + e²/ℓ²) keep rewards bounded
 and free of roots and exponentials.
 """
 
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from caster_gym.mechanics.actuation import conditioning
 from caster_gym.mechanics.contact import Touch
@@ -68,35 +68,6 @@ class Errors(NamedTuple):
     vx: Scalar  # [m/s]
     vy: Scalar
     omega: Scalar  # [rad/s]
-
-
-class Weights(NamedTuple):
-    """What tracking is worth, and when it has failed."""
-
-    position: Scalar  # [1] reward for being at the reference
-    heading: Scalar
-    speed: Scalar
-    effort: Scalar
-    impact: Scalar
-    position_scale: Scalar  # ℓ [m] the error at which half of the fine kernel is left
-    heading_scale: Scalar  # [rad]
-    speed_scale: Scalar  # [m/s]
-    yaw_rate_scale: Scalar  # [rad/s]
-    impact_scale: Scalar  # [N s] normal impulse in a control period that costs half of the weight
-    coarse: Scalar  # ratio of the wide kernel's length to the fine one's
-    corridor: Scalar  # [m] position error that ends the episode
-    touching_ends: Scalar  # 1 if touching an obstacle ends the episode, else 0
-
-
-class Terms(NamedTuple):
-    """Reward terms; the reward is their sum."""
-
-    position: Scalar
-    heading: Scalar
-    speed: Scalar
-    effort: Scalar
-    impact: Scalar
-    alive: Scalar
 
 
 class Record(NamedTuple):
@@ -170,28 +141,6 @@ def distance_square(errors: Errors) -> Scalar:
 def impact_share(pressing: Scalar, scale: Scalar) -> Scalar:
     """How bad an impact was, 0 … 1: half at an impulse of `scale`."""
     return pressing / (pressing + scale)
-
-
-def reward_terms(errors: Errors, effort: Scalar, record: Record, failed: Scalar, weights: Weights) -> Terms:
-    """Bounded tracking quality minus effort and impacts, never negative in sum: staying in the task beats leaving it.
-
-    The term `alive` equals the greatest cost. effort is the mean square of the torques as shares of their limits.
-    """
-    rate = (errors.vx * errors.vx + errors.vy * errors.vy) / (weights.speed_scale * weights.speed_scale)
-    rate = rate + errors.omega * errors.omega / (weights.yaw_rate_scale * weights.yaw_rate_scale)
-    wide = weights.coarse
-    alive = where(failed > 0.5, 0.0, 1.0)
-    position = both_kernels(distance_square(errors), weights.position_scale, wide)
-    heading = both_kernels(turn_square(errors), weights.heading_scale, wide)
-    speed = 0.5 * (kernel(rate, 1.0) + kernel(rate, wide))
-    return Terms(
-        where(failed > 0.5, 0.0, weights.position * position),
-        where(failed > 0.5, 0.0, weights.heading * heading),
-        where(failed > 0.5, 0.0, weights.speed * speed),
-        where(failed > 0.5, 0.0, -weights.effort * effort),
-        where(failed > 0.5, 0.0, -weights.impact * impact_share(record.pressing, weights.impact_scale)),
-        (weights.effort + weights.impact) * alive,
-    )
 
 
 def not_finite(state: State) -> Scalar:
@@ -316,9 +265,34 @@ class Endings(NamedTuple):
     touched: Scalar
 
 
-def endings(state: State, errors: Errors, record: Record, corridor: Scalar, touching_ends: Scalar) -> Endings:
-    """Whether an episode ends here."""
-    return Endings(left_corridor(errors, corridor), not_finite(state), touched(record, touching_ends))
+class Moment(NamedTuple):
+    """One robot at the end of a control period: all that rewards and endings may depend on."""
+
+    state: State
+    reference: Reference
+    errors: Errors
+    effort: Scalar  # mean square of the torques as shares of their limits, 0 … 1
+    record: Record
+    situation: Situation
+
+
+def endings(moment: Moment, weights: Any) -> Endings:
+    """Whether an episode ends here: outside the corridor, not finite, or touching an obstacle where that ends it."""
+    return Endings(
+        left_corridor(moment.errors, weights.corridor),
+        not_finite(moment.state),
+        touched(moment.record, weights.touching_ends),
+    )
+
+
+def any_of(ended: Endings) -> Scalar:
+    """1 if an episode ends, for whatever reason, else 0."""
+    return maximum(maximum(ended.left_corridor, ended.not_finite), ended.touched)
+
+
+def unless(failed: Scalar, term: Scalar) -> Scalar:
+    """The term, or 0 in a step that ends the episode."""
+    return where(failed > 0.5, 0.0, term)
 
 
 class Report(NamedTuple):

@@ -19,7 +19,7 @@ from caster_gym.configuration import Frozen
 if TYPE_CHECKING:
     from caster_gym.envs.native.engine import TaskEngine
     from caster_gym.envs.observation import Part
-    from caster_gym.envs.task import Task
+    from caster_gym.tasks.parameters import TaskParameters
 
 Actions: TypeAlias = NDArray[np.float32]
 Observations: TypeAlias = NDArray[np.float32]
@@ -63,7 +63,7 @@ class Place:
     """Where a feature works."""
 
     engine: "TaskEngine"
-    task: "Task"
+    task: "TaskParameters"
     width: int  # of the actions that the feature inside understands
     seeds: Seeds  # (robots,) of the feature's random numbers in the present episodes; the stack keeps them up to date
     clocks: Indices  # (robots,) control periods done in them, likewise

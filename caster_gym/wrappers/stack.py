@@ -25,7 +25,7 @@ from caster_gym.wrappers.feature import (
 
 if TYPE_CHECKING:
     from caster_gym.envs.native.engine import TaskEngine
-    from caster_gym.envs.task import Task
+    from caster_gym.tasks.parameters import TaskParameters
 
 EVERYONE = slice(None)
 _TRIED = 32  # draws of the plants that are checked beforehand
@@ -39,7 +39,9 @@ class Stack:
     before has been looked at.
     """
 
-    def __init__(self, engine: "TaskEngine", task: "Task", features: Sequence[Feature], space: "Box[Any]") -> None:
+    def __init__(
+        self, engine: "TaskEngine", task: "TaskParameters", features: Sequence[Feature], space: "Box[Any]"
+    ) -> None:
         if any(isinstance(getattr(hook, "__self__", None), Stack) for hook in engine.on_restart):
             raise ValueError("this environment has been wrapped before: give all features to one call of wrap")
         self._engine, self._task, self.action_space = engine, task, space

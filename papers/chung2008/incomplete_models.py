@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from caster_gym.agents.comparison.track_metrics import SETTLING
 from caster_gym.agents.control.computed_torque import gains
 from caster_gym.arrays import Array
+from caster_gym.tasks.track.metrics import METRICS
 from papers.chung2008.model_figures import picture
 from papers.chung2008.model_trials import (
     BARE,
@@ -213,7 +213,7 @@ def _tables(studies: list[Study]) -> tuple[Table, ...]:
         Table(
             "incomplete_models_disturbed",
             f"The highest speed from {STARTS} starts beside the reference with casters anyhow, as the benchmark has "
-            f"them: position RMSE from {SETTLING:g} s on. Soft feedback is still settling then.",
+            f"them: position RMSE from {METRICS.settling:g} s on. Soft feedback is still settling then.",
             head,
             [
                 [*row(*case, -1)[:4], *(1e3 * e).tolist(), *(e[1:] / e[0]).tolist()]

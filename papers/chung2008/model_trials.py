@@ -7,13 +7,10 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from caster_gym.agents.comparison.evaluation import Episodes, roll_out
-from caster_gym.agents.comparison.measuring import rms
-from caster_gym.agents.comparison.track_metrics import SETTLING, measure
+from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.control.computed_torque import ComputedTorque, Gains, KnownModel, gains, known_model
 from caster_gym.arrays import Array
 from caster_gym.engines.numpy_model import Model
-from caster_gym.envs.caster_track import CasterTrackVectorEnv
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.paths.feasibility import motor_use
 from caster_gym.paths.headings import Spinning
@@ -22,6 +19,10 @@ from caster_gym.paths.shapes import Circle, Ellipse, Shape
 from caster_gym.paths.specification import AnyPath
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.robot import Robot, load_robot
+from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.measuring import rms
+from caster_gym.tasks.track.environment import CasterTrackVectorEnv
+from caster_gym.tasks.track.metrics import METRICS, measure
 from papers.chung2008.model_error import lacks, predict, trailing_steering
 
 MODELS: tuple[KnownModel, ...] = get_args(KnownModel)  # the exact one first
@@ -240,7 +241,7 @@ def study(name: str) -> Study:
     fastest = [ladder[-1] for ladder in ladders]
     held = [path for kind, path in zip(PATHS, fastest, strict=True) if kind in HELD]
     finely = run_trials(robot, held, FINE_PERIOD, models=MODELS[:1]).position[0, :, 0]
-    disturbed = run_trials(robot, fastest, starts=STARTS, settling=SETTLING).settled
+    disturbed = run_trials(robot, fastest, starts=STARTS, settling=METRICS.settling).settled
 
     def on_ladders(values: Array) -> Array:
         return _pooled(values, counts).reshape(*values.shape[:-1], len(PATHS), RUNGS)

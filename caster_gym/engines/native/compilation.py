@@ -17,6 +17,7 @@ from numba.core import compiler, event, serialize
 from numba.core.caching import _Cache
 
 from caster_gym.engines.native import compiled_files
+from caster_gym.engines.native.outside_sources import outside_digest
 from caster_gym.engines.native.turns import Turn, take_turn
 
 _dumps: Any = serialize.dumps  # Numba ships these without types
@@ -79,7 +80,7 @@ class SharedCache(_Cache):
         if not self._enabled:
             return None
         key = self._key(sig, target_context.codegen())
-        found = self._load(key, target_context)
+        found = self._load(key, target_context) if key else None
         if found is not None or self._describe is None:
             return found
         work = self._describe(sig if isinstance(sig, tuple) else sig.args)
@@ -89,8 +90,9 @@ class SharedCache(_Cache):
                 _say(f"another process is compiling for {work.what}, waiting for it")
 
         self._end_turn()
-        self._turn = take_turn(Path(self.cache_path) / f"{_file_name(self._function, key)}.turn", on_waiting)
-        found = self._load(key, target_context)  # which another process may just have kept
+        if key:
+            self._turn = take_turn(Path(self.cache_path) / f"{_file_name(self._function, key)}.turn", on_waiting)
+            found = self._load(key, target_context)  # which another process may just have kept
         if found is not None:
             self._end_turn()
             return found
@@ -105,7 +107,8 @@ class SharedCache(_Cache):
         try:
             if self._enabled and not data.library.has_dynamic_globals:
                 key = self._key(sig, data.codegen)
-                compiled_files.keep(_file_name(self._function, key), _dumps((key, data._reduce())))
+                if key:
+                    compiled_files.keep(_file_name(self._function, key), _dumps((key, data._reduce())))
         except OSError as error:
             if not _complained:
                 _complained = True
@@ -140,8 +143,14 @@ class SharedCache(_Cache):
             return None
 
     def _key(self, sig: Any, codegen: Any) -> str:
-        """All that a specialisation depends on, beside the version: its types and the processor."""
-        return repr((self._name, self._source, str(sig), codegen.magic_tuple()))
+        """All that a specialisation depends on, beside the version: its types, sources from outside, the processor.
+
+        Empty where it cannot be kept.
+        """
+        outside = outside_digest(sig if isinstance(sig, tuple) else sig.args)
+        if outside is None:
+            return ""
+        return repr((self._name, self._source, str(sig), *([outside] if outside else []), codegen.magic_tuple()))
 
     def _end_turn(self) -> None:
         if self._turn is not None:

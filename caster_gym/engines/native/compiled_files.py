@@ -48,9 +48,9 @@ def roots() -> Iterator[Path]:
 def source_digest() -> str:
     """Short hash of every source file whose code may be compiled; what is Torch's is not."""
     digest = hashlib.sha256()
-    for folder in ("mechanics", "engines", "envs"):
+    for folder in ("mechanics", "engines", "envs", "tasks"):
         for file in sorted((_PACKAGE / folder).rglob("*.py")):
-            if file.parent.name != "tensor":
+            if "tensor" not in (file.parent.name, file.stem):
                 digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 

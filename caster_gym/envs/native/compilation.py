@@ -3,7 +3,7 @@
 from typing import Any
 
 from caster_gym.engines.native.compilation import Work
-from caster_gym.envs.native.reference import Timetable
+from caster_gym.envs.native.reference import code_of
 
 
 def of_restart(types: tuple[Any, ...]) -> Work:
@@ -25,7 +25,7 @@ def of_batch_step(types: tuple[Any, ...]) -> Work:
 
 
 def _words(world: Any, sizes: Any, how: str) -> str:
-    task = "CasterTrack" if _part(world, "guide").instance_class is Timetable else "CasterFollow"
+    task = code_of(_part(world, "guide")).name
     around = " among obstacles" if _among_obstacles(world) else ""
     nearest = _count(sizes, "nearest")
     seen = f", {_several(nearest, 'observed obstacle')}" if nearest else ""

@@ -19,7 +19,6 @@ from caster_gym.envs.infos import named
 from caster_gym.envs.native import layout
 from caster_gym.envs.native import step as kernel
 from caster_gym.envs.native.layout import FIXED_REPORT_ROWS
-from caster_gym.envs.native.reference import Courses
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan
 from caster_gym.envs.scene import Scene, draw_scene
@@ -238,9 +237,7 @@ class TaskEngine:
         """
         world = self._world
         blocks, parameters, clocks, _ = self.changing
-        guide: Any = world.guide
-        if progress_stays and isinstance(guide, Courses):
-            guide = guide._replace(window=0.0)
+        guide: Any = world.guide.still() if progress_stays else world.guide
         clocks[0] -= 1
         still = world._replace(blocks=blocks, parameters=parameters, clocks=clocks, guide=guide, substeps=0)
         outcome = self._empty()

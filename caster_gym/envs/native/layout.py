@@ -37,7 +37,7 @@ class World(NamedTuple):
     clocks: Any  # int64 (2, robots): control periods done, path
     seeds: Any  # uint64 (2, robots): key, episode
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
-    guide: Any  # Timetable or Courses
+    guide: Any  # ReferenceSource of the task
     hull: Any  # Hull; this and the next two are None where there is no obstacle
     obstacles: Any  # Obstacles
     arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path

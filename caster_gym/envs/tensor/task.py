@@ -7,7 +7,7 @@ Nothing waits for the device, and nothing is written in place.
 import math
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -18,14 +18,14 @@ from caster_gym.engines.tensor.compiler import compiled
 from caster_gym.engines.tensor.fleet import BODY_ROWS
 from caster_gym.engines.tensor.motion import driven_rows, slipping_rows, surface_below, torch_floor
 from caster_gym.engines.tensor.scalars import check_memory, checked_device, checked_dtype
+from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike
 from caster_gym.envs.native import layout
 from caster_gym.envs.native.engine import DRAW_A_PATH
-from caster_gym.envs.native.reference import Courses, judge
-from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine, track_engine
+from caster_gym.envs.native.reference import evaluated
 from caster_gym.envs.starts import DRAWN, Start, check_free, check_longest, check_motion, check_place, nearest_row
 from caster_gym.envs.tensor.obstacles import Given, torch_surroundings
 from caster_gym.envs.tensor.randomness import episode_seed, uniform
-from caster_gym.envs.tensor.reference import TorchGuide, torch_guide
+from caster_gym.envs.tensor.reference import TorchSource, torch_weights
 from caster_gym.envs.tracking import (
     ASKS,
     GAP_LIMIT,
@@ -45,11 +45,12 @@ from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.room import step_within_room
 from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, total
 from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
+from caster_gym.paths.specification import PathLike
 
-TaskName: TypeAlias = Literal["track", "follow"]
+if TYPE_CHECKING:
+    from caster_gym.tasks.task import Task
 
 DIAGNOSTICS = ("traction_use", "wheels_lifted", "conditioning")
-_ENGINES = {"track": (track_engine, "random_paths"), "follow": (follow_engine, "rounded_square")}
 _BEFORE = -1.0  # [m] progress of an episode that is about to start
 
 
@@ -97,10 +98,11 @@ class TorchTask:
     wherever motor limits and kernels have a slope, and end where an episode starts anew. An action that is not a number
     ends its robot's episode as not finite, since to look for it would wait for the device.
 
-    name: "track" or "follow". robot, path, actuation, arena, fields: as for `CasterTrackEnv` and `CasterFollowEnv`, the
-    fields being those of the task. longest: greatest number of control periods of an episode. compile fuses each part
-    of a step into few kernels; graphs replays them as CUDA graphs, without gradients, see `TorchVectorEnv`. Without
-    diagnostics, infos leave out traction use and conditioning, which take longer than everything else that is observed.
+    task: its name, as "track" or "my_module:MY_TASK", or its object. robot, path, actuation, arena: as for
+    `CasterTrackEnv`; fields: of the task's parameters. longest: greatest number of control periods of an episode.
+    compile fuses each part of a step into few kernels; graphs replays them as CUDA graphs, without gradients, see
+    `TorchVectorEnv`. Without diagnostics, infos leave out traction use and conditioning, which take longer than
+    everything else that is observed.
 
     parameters: the robot's own numbers, which may be replaced by others, or by tensors (robots,) of them.
 
@@ -116,7 +118,7 @@ class TorchTask:
 
     def __init__(
         self,
-        name: TaskName = "track",
+        task: "str | Task" = "track",
         robot: RobotLike = "chung2008",
         path: PathLike | None = None,
         actuation: Actuation = None,
@@ -130,15 +132,18 @@ class TorchTask:
         graphs: bool = False,
         diagnostics: bool = True,
     ) -> None:
-        if name not in _ENGINES:
-            raise ValueError(f'the task must be "track" or "follow", got {name!r}')
+        from caster_gym.tasks.building import build_engine  # tasks stand above, and are looked up when one is asked for
+        from caster_gym.tasks.registry import find_task
+
+        self.definition = definition = find_task(task)
         self.dtype, self.device = checked_dtype(dtype), checked_device(device)
-        build, usual = _ENGINES[name]
-        made = build(robot, usual if path is None else path, actuation, arena, fields or {}, 1, longest)
-        self.engine, self.task = made
+        self.engine, self.task = build_engine(definition, robot, path, actuation, arena, fields or {}, 1, longest)
         self.robot, self.layout, self.diagnostics = self.engine.robot, self.engine.layout, diagnostics
         self.parameters: RobotParameters = robot_parameters(self.robot)
-        self._guide = torch_guide(self.engine.plan.guide, self.dtype, self.device)
+        self._guide: TorchSource = self._on_tensors(self.engine.plan.guide)
+        numbers = self.engine.plan.guide.weights
+        self._weights = definition.weights(*torch_weights(numbers, self.dtype, self.device))
+        self._reward, self._endings = definition.reward, definition.endings
         self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
         self._floor = None if self.task.slippery is None else torch_floor(self.task.slippery)
         self._slipping = self.engine.slipping
@@ -151,6 +156,14 @@ class TorchTask:
         self._compiled = compile
         self.graphs = compile and graphs and self._around is None  # obstacles wait for the device
         self._compile()
+
+    def _on_tensors(self, source: Any) -> TorchSource:
+        if not hasattr(source, "on_tensors"):
+            raise ValueError(
+                f"task {self.definition.name!r} does not run on tensors: its {type(source).__name__} has no on_tensors"
+            )
+        made: TorchSource = source.on_tensors(self.dtype, self.device)
+        return made
 
     def _compile(self) -> None:
         self._move, self._look, self._place = self._moved, self._looked, self._placed
@@ -311,7 +324,7 @@ class TorchTask:
         paths: Tensor,
         before: Tensor,
         robot: RobotParameters,
-        guide: TorchGuide | None = None,
+        guide: TorchSource | None = None,
     ) -> tuple[TaskOutcome, Tensor, Tensor]:
         """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start.
 
@@ -325,7 +338,9 @@ class TorchTask:
         reference = guidance.reference
         gap, nearest = self._look_around(state, paths)
         situation = Situation(guidance.progress, guidance.share, gap)
-        errors, ended, terms = judge(state, reference, torques, done, situation, robot, guide.weights)
+        errors, ended, terms = evaluated(
+            state, reference, torques, done, situation, robot, self._weights, self._endings, self._reward
+        )
         if self.diagnostics:
             whole = report(state, reference, errors, done, situation, ended, terms, robot)
         else:
@@ -412,7 +427,7 @@ class TorchTask:
 
     def _moved_to(
         self, given: Start, bodies: Tensor, state: TaskState, paths: Tensor, checked: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor, TorchGuide]:
+    ) -> tuple[Tensor, Tensor, Tensor, TorchSource]:
         """Drawn bodies where a start is given, with clocks, progress, and a guide under which progress stays.
 
         Does what `caster_gym.envs.starts` does with arrays. Raises ValueError for what can be no start.
@@ -420,20 +435,19 @@ class TorchTask:
         engine, rows = self.engine, list(bodies[: BODY_ROWS + self._joints].unbind(0))
         plain, chosen = paths.cpu().numpy(), checked.cpu().numpy()
         clocks, progress = torch.zeros_like(state.clocks), torch.zeros_like(state.progress)
-        guide, still = engine.plan.guide, self._guide
-        if courses := isinstance(guide, Courses):
-            still = torch_guide(guide._replace(window=0.0), self.dtype, self.device)
+        guide = engine.plan.guide
+        by_progress, still = guide.place == "progress", self._on_tensors(guide.still())
         if given.place is not None:
             place = given.place.copy()
             place[chosen] = check_place(engine, plain[chosen], place[chosen])
-            if courses:
+            if by_progress:
                 progress = self._tensor(place)
             else:
                 check_longest(engine)
                 clocks = torch.as_tensor(np.rint(place / engine.control_period).astype(np.int64), device=self.device)
             none = torch.zeros_like(rows[0])
             nowhere = State((none, none), (none, none), (none, none, none), ())
-            reference = still.reference_at(paths, progress if courses else clocks, nowhere)
+            reference = still.reference_at(paths, progress if by_progress else clocks, nowhere)
             offset, turn = self._displacement(episode_seed(state.keys, state.episodes))
             rows[:4] = pack_state(start(reference, offset, turn, ()))[:4]
         if given.pose is not None:
@@ -447,7 +461,7 @@ class TorchTask:
         if given.twist is not None:
             directions = torch.stack(rows[BODY_ROWS:]).detach().cpu().double().numpy()
             check_motion(self.robot, np.arctan2(directions[1::2], directions[::2]).T[chosen], given.twist[chosen])
-        if courses and given.pose is not None and given.place is None:
+        if by_progress and given.pose is not None and given.place is None:
             before = self._tensor(nearest_row(engine, plain, given.pose[:, :2]))
             progress = self._guide.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
         return self._rolling(torch.stack(rows)), clocks, progress, still

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import torch
@@ -12,21 +12,25 @@ from torch import Tensor
 
 from caster_gym.engines.tensor.compiler import replayed
 from caster_gym.engines.tensor.scalars import check_memory, listed_robots, parameter_rows, parameters_of
-from caster_gym.envs.inputs import Seeds, check_counts, checked_seeds
+from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, Seeds, check_counts, checked_seeds
 from caster_gym.envs.native.engine import DRAW_A_PATH
-from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, action_space, observation_space
+from caster_gym.envs.spaces import action_space, observation_space
 from caster_gym.envs.starts import read_options, read_start
-from caster_gym.envs.tensor.task import TaskName, TaskOutcome, TaskState, TorchTask
+from caster_gym.envs.tensor.task import TaskOutcome, TaskState, TorchTask
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
+from caster_gym.paths.specification import PathLike
 from caster_gym.robot import Robot
+
+if TYPE_CHECKING:
+    from caster_gym.tasks.task import Task
 
 
 class TorchVectorEnv:
     """Many robots at one of the tasks, on tensors: the batch of `gym.make_vec`, without leaving the device.
 
     The same seeds give the same episodes as `gym.make_vec` with AutoresetMode.SAME_STEP does. Arguments are those of
-    `CasterTrackVectorEnv` ("track") and `CasterFollowVectorEnv` ("follow"). `reset` and `step` return new tensors on
-    the device at every call: observations (num_envs, size) and rewards (num_envs,) in `dtype`, `terminated` and
+    its batch there, such as `CasterTrackVectorEnv` ("track"). `reset` and `step` return new tensors on the device at
+    every call: observations (num_envs, size) and rewards (num_envs,) in `dtype`, `terminated` and
     `truncated` (num_envs,) as booleans, and infos with the same keys. Robots whose episode ends start a new one in the
     same step: what they saw last is in info["final_obs"] and info["final_info"], true where info["_final_obs"] is. (On
     a CPU these are the observations and infos themselves in steps where nobody's ends.)
@@ -51,7 +55,7 @@ class TorchVectorEnv:
 
     def __init__(
         self,
-        task: TaskName = "track",
+        task: "str | Task" = "track",
         num_envs: int = 1,
         robot: RobotLike = "chung2008",
         path: PathLike | None = None,

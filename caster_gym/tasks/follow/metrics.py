@@ -4,11 +4,9 @@ from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
-from caster_gym.agents.comparison.evaluation import Episodes
-from caster_gym.agents.comparison.measuring import Counted, Printed, costs, greatest, overall, rms
 from caster_gym.arrays import Array
-
-SETTLING = 1.0  # [s]
+from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.measuring import Counted, Metrics, Printed, costs, greatest, overall, rms
 
 
 class FollowMetrics(NamedTuple):
@@ -68,7 +66,7 @@ def measure(episodes: Episodes, settling: float) -> FollowMetrics:
 
     An episode that failed counts with what it did before; one that was over before settling has no errors (NaN).
     """
-    arrived = episodes.progress >= episodes.goal
+    arrived = episodes.progress >= episodes.facts["goal"]
     finished = np.asarray(arrived.any(axis=0))
     steps = np.isfinite(episodes.reward).sum(axis=0)
     last = np.where(finished, arrived.argmax(axis=0), steps - 1)
@@ -81,7 +79,7 @@ def measure(episodes: Episodes, settling: float) -> FollowMetrics:
     return FollowMetrics(
         finished.astype(np.float64),
         lap_time,
-        lap_time / episodes.law,
+        lap_time / episodes.facts["law"],
         reached / time,
         rms(off),
         greatest(off),
@@ -93,3 +91,6 @@ def measure(episodes: Episodes, settling: float) -> FollowMetrics:
         reward=np.nansum(episodes.reward, axis=0) / episodes.allowed,
         failed=episodes.failed.astype(np.float64),
     )
+
+
+METRICS = Metrics(measure, FollowVerdict, settling=1.0)

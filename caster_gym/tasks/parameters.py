@@ -1,17 +1,17 @@
 """What all tasks have in common: time, corridor, starts, obstacles and costs."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 
 from caster_gym.configuration import Frozen
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 from caster_gym.floor import Floor
 
 
-class Task(Frozen):
-    """How a path is to be walked, and what that costs."""
+class TaskParameters(Frozen):
+    """How a path is to be walked, and what that costs; a task adds its own fields, among them `preview`."""
 
     usual_names: ClassVar[Mapping[str, str]] = {
         "dt": "control_period",
@@ -53,6 +53,7 @@ class Task(Frozen):
     start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
     touching: Literal["allowed", "ends"] = "allowed"  # what touching an obstacle means for the episode
+    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = ()  # horizons at which the reference is shown
     nearest: Annotated[int, Field(ge=0, le=16)] = 0  # obstacles that the observation shows
     floor: Literal["grip"] | Floor = "grip"  # or one of finite friction, on which wheels may slip
     effort_weight: NonNegativeFloat = 0.02
@@ -77,13 +78,19 @@ class Task(Frozen):
         return None if self.floor == "grip" else self.floor
 
     @property
+    def touching_ends(self) -> bool:
+        """Whether an episode ends when the robot touches an obstacle."""
+        return self.touching == "ends"
+
+    @property
     def start_reach(self) -> float:
         """Greatest distance of a start from the path. [m]"""
         return float(self.start_offset * 2.0**0.5)
 
-    def check_start(self) -> None:
-        """Refuse starts outside the corridor."""
+    @model_validator(mode="after")
+    def _starts_in_its_corridor(self) -> Self:
         if self.start_reach >= self.corridor:
             raise ValueError(
                 f"a start_offset of {self.start_offset:g} m along both axes leaves the corridor of {self.corridor:g} m"
             )
+        return self

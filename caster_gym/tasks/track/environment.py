@@ -1,16 +1,10 @@
 """CasterTrack-v0: follow a timed trajectory with motor torques."""
 
-from typing import Any
-
-from gymnasium.vector import AutoresetMode
-
-from caster_gym.envs.caster_env import CasterEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv
-from caster_gym.envs.inputs import check_counts
-from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, track_engine
+from caster_gym.tasks.environment import TaskEnv, TaskVectorEnv
+from caster_gym.tasks.track import TASK
 
 
-class CasterTrackEnv(CasterEnv):
+class CasterTrackEnv(TaskEnv):
     """An omnidirectional robot on powered casters follows a timed trajectory. B is the body frame, W the world frame.
 
     **Action** `Box(−1, 1, (driven joints,), float32)`, held for a control period (0.02 s by default):
@@ -103,7 +97,7 @@ class CasterTrackEnv(CasterEnv):
     poses with times, a Trajectory, a specification, or several of these, of which each episode draws one. actuation:
     "all" or the names of the driven joints; by default the robot's own. arena: obstacles (`caster_gym.arena`).
     render_mode: "human" or "rgb_array". All other keywords are fields of
-    `caster_gym.envs.track_task.TrackTask`, which holds the numbers above; unknown ones are errors.
+    `caster_gym.tasks.track.parameters.TrackParameters`, which holds the numbers above; unknown ones are errors.
 
     >>> import caster_gym, gymnasium
     >>> env = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
@@ -113,19 +107,10 @@ class CasterTrackEnv(CasterEnv):
     ((46,), 0.532, 0.051)
     """
 
-    def __init__(
-        self,
-        robot: RobotLike = "chung2008",
-        path: PathLike = "random_paths",
-        actuation: Actuation = None,
-        arena: ArenaLike = None,
-        render_mode: str | None = None,
-        **task: Any,
-    ) -> None:
-        super().__init__(*track_engine(robot, path, actuation, arena, task, 1), render_mode)
+    definition = TASK
 
 
-class CasterTrackVectorEnv(CasterVectorEnv):
+class CasterTrackVectorEnv(TaskVectorEnv):
     """A batch of `CasterTrackEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
 
     max_episode_steps truncates episodes before their trajectory ends. All other arguments are those of
@@ -139,18 +124,4 @@ class CasterTrackVectorEnv(CasterVectorEnv):
     ((16, 46), (16,), (16,))
     """
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        robot: RobotLike = "chung2008",
-        path: PathLike = "random_paths",
-        actuation: Actuation = None,
-        arena: ArenaLike = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | None = None,
-        render_mode: str | None = None,
-        **task: Any,
-    ) -> None:
-        check_counts(num_envs, max_episode_steps)
-        made = track_engine(robot, path, actuation, arena, task, num_envs, max_episode_steps)
-        super().__init__(*made, autoreset_mode, render_mode)
+    definition = TASK

@@ -1,9 +1,9 @@
-"""caster_gym.agents.comparison.follow_metrics: times, errors and impacts of hand-made episodes, and what is better."""
+"""caster_gym.tasks.follow.metrics: times, errors and impacts of hand-made episodes, and what is better."""
 
 import numpy as np
 import pytest
 
-from caster_gym.agents.comparison.follow_metrics import FollowVerdict, measure
+from caster_gym.tasks.follow.metrics import FollowVerdict, measure
 from tests.series import PERIOD, STEPS, column, episodes
 
 SETTLING = 1.0  # [s] two steps

@@ -1,12 +1,12 @@
-"""What the metrics of all tasks share: how they are printed, and means over time of series with gaps."""
+"""How tasks are measured: what metrics are, how they are printed, and means over time of series with gaps."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from caster_gym.agents.comparison.evaluation import Episodes
 from caster_gym.arrays import Array
+from caster_gym.tasks.episodes import Episodes
 
 SATURATED = 0.999  # commands from here on count as saturated, and torques that differ from theirs by the rest
 
@@ -29,6 +29,19 @@ class Counted(NamedTuple):
     """How a quantity that is 1 or 0 appears in tables: how many are 1, of how many."""
 
     label: str
+
+
+class Metrics(NamedTuple):
+    """How episodes of a task are measured, and what is better.
+
+    A verdict is a named tuple that tells how good an agent is on validation paths: `verdict.of(measured)` makes it,
+    `failures` counts, and the greatest `merit`, a tuple of numbers, is the best. `Printed` and `Counted` in annotations
+    of fields say what tables and figures show.
+    """
+
+    measure: Callable[[Episodes, float], Any]  # a named tuple of metrics (episodes,), from episodes and settling [s]
+    verdict: Any
+    settling: float  # [s] what comes before counts as transient
 
 
 def shown(quantities: type[Any]) -> Iterator[tuple[str, Printed | Counted]]:

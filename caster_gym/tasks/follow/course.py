@@ -1,53 +1,17 @@
-"""Following a path at one's own pace, on generic scalars: where the robot is on it, and what its progress is worth.
+"""A path that is followed at the robot's own pace, on generic scalars: its points, its nearest point, its reference.
 
 A row of a course, see `caster_gym.paths.course`, is (x, y, t_x, t_y, κ, cos ψ, sin ψ, ψ′, ψ″, ṡ²) at an arc length;
 between two rows the point is Hermite's cubic, everything else is linear.
 """
 
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
-from caster_gym.envs.tracking import (
-    Errors,
-    Record,
-    Reference,
-    both_kernels,
-    distance_square,
-    impact_share,
-    kernel,
-    turn_square,
-)
-from caster_gym.mechanics.scalars import Scalar, clip, each, maximum, sqrt, where
+from caster_gym.envs.tracking import Reference, kernel
+from caster_gym.mechanics.scalars import Scalar, clip, each, maximum, sqrt
 
 Row: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 
 NEWTON_STEPS = 3  # of the projection, from the nearest chord
-
-
-class FollowWeights(NamedTuple):
-    """What following is worth, and when it has failed."""
-
-    progress: Scalar  # [1] reward for going as fast as allowed, wherever
-    cross_track: Scalar  # for doing so on the path
-    heading: Scalar  # and turned as the path asks
-    effort: Scalar
-    impact: Scalar
-    cross_track_scale: Scalar  # ℓ [m] the error at which half of the fine kernel is left
-    heading_scale: Scalar  # [rad]
-    impact_scale: Scalar  # [N s] normal impulse in a control period that costs half of the weight
-    coarse: Scalar  # ratio of the wide kernel's length to the fine one's
-    corridor: Scalar  # [m] position error that ends the episode
-    touching_ends: Scalar  # 1 if touching an obstacle ends the episode, else 0
-
-
-class FollowTerms(NamedTuple):
-    """Reward terms; the reward is their sum."""
-
-    progress: Scalar
-    cross_track: Scalar
-    heading: Scalar
-    effort: Scalar
-    impact: Scalar
-    alive: Scalar
 
 
 def blend(share: Scalar, a: Scalar, b: Scalar) -> tuple[Scalar]:
@@ -132,28 +96,6 @@ def at_rest(reference: Reference) -> Reference:
     """The same place without motion."""
     none = 0.0 * reference.x
     return Reference(reference.x, reference.y, reference.cos, reference.sin, none, none, none, none, none, none)
-
-
-def follow_terms(
-    errors: Errors, share: Scalar, effort: Scalar, record: Record, failed: Scalar, weights: FollowWeights
-) -> FollowTerms:
-    """Progress times quality minus effort and impacts, never negative in sum: staying in the task beats leaving it.
-
-    Quality counts only as far as there is progress, so that resting on the path earns nothing but `alive`, which equals
-    the greatest cost.
-    """
-    wide = weights.coarse
-    near = both_kernels(distance_square(errors), weights.cross_track_scale, wide)
-    turned = both_kernels(turn_square(errors), weights.heading_scale, wide)
-    alive = where(failed > 0.5, 0.0, 1.0)
-    return FollowTerms(
-        where(failed > 0.5, 0.0, weights.progress * share),
-        where(failed > 0.5, 0.0, weights.cross_track * share * near),
-        where(failed > 0.5, 0.0, weights.heading * share * turned),
-        where(failed > 0.5, 0.0, -weights.effort * effort),
-        where(failed > 0.5, 0.0, -weights.impact * impact_share(record.pressing, weights.impact_scale)),
-        (weights.effort + weights.impact) * alive,
-    )
 
 
 def arrived_share(x: Scalar, y: Scalar, last: Row, scale: Scalar) -> Scalar:

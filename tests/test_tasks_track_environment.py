@@ -1,4 +1,4 @@
-"""caster_gym.envs.caster_track, .caster_env, .setup, .track_task, .task_engine: the single one as its users meet it."""
+"""caster_gym.tasks.track.environment, .parameters: the single one as its users meet it."""
 
 import warnings
 
@@ -11,8 +11,9 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.actuation import ActuationWarning
-from caster_gym.envs.caster_track import CasterTrackEnv
-from caster_gym.envs.setup import track_engine
+from caster_gym.tasks.building import build_engine
+from caster_gym.tasks.track import TASK
+from caster_gym.tasks.track.environment import CasterTrackEnv
 
 ID = "caster_gym:CasterTrack-v0"
 CIRCLE = {"shape": "circle", "radius": 0.3, "duration": 6.0}  # 300 steps; a robot at rest stays within 0.65 m of it
@@ -331,7 +332,7 @@ def test_a_coarse_step_is_refused_for_the_robot_that_it_is_too_coarse_for():
 
 def test_trajectories_are_built_once_for_all_environments_of_a_process():
     """Thousand single environments do not hold thousand tables."""
-    (first, _), (second, _) = (track_engine("chung2008", "random_paths", None, None, {}, count) for count in (1, 2))
+    (first, _), (second, _) = (build_engine(TASK, "chung2008", None, None, None, {}, count) for count in (1, 2))
     assert first.plan is second.plan
 
 

@@ -1,4 +1,4 @@
-"""caster_gym.envs.caster_follow, .follow_task, .setup: the following task as users meet it, alone and in a batch."""
+"""caster_gym.tasks.follow.environment, .parameters: the following task as users meet it, alone and in a batch."""
 
 import re
 import warnings
@@ -13,8 +13,8 @@ from numpy.testing import assert_array_equal
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from caster_gym.engines.native.lanes import LANES
-from caster_gym.envs.caster_follow import CasterFollowEnv, CasterFollowVectorEnv
-from caster_gym.envs.follow_task import FollowTask
+from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+from caster_gym.tasks.follow.parameters import FollowParameters
 from tests.test_envs_vector import assert_same, random_actions
 
 ID = "caster_gym:CasterFollow-v0"
@@ -53,7 +53,7 @@ def test_spaces_are_those_of_the_docstring():
 
 def test_the_docstring_tells_the_numbers_of_the_task():
     """Weights and scales of the table, and the lengths of the text, are the defaults."""
-    text, task = CasterFollowEnv.__doc__, FollowTask()
+    text, task = CasterFollowEnv.__doc__, FollowParameters()
     number = r"(-?[\d.]+)"
     said = {
         rf"\| progress \| {number} σ \|": task.progress_weight,
@@ -304,9 +304,9 @@ def _started():
 @pytest.mark.parametrize("fields", [{"window": 0.03}, {"speed_limit": 1 / 3, "control_period": 0.013, "window": 1e-3}])
 def test_the_window_that_a_message_names_is_wide_enough(fields):
     with pytest.raises(ValueError, match="must be at least") as error:
-        FollowTask(**fields)
+        FollowParameters(**fields)
     least = float(re.search(r"at least ([\d.]+) m", str(error.value))[1])
-    assert FollowTask(**{**fields, "window": least})
+    assert FollowParameters(**{**fields, "window": least})
 
 
 def test_a_start_too_near_to_an_obstacle_is_free_once_it_is_displaced_less_as_is_advised():

@@ -1,9 +1,9 @@
-"""agents.comparison.track_metrics: errors of hand-made episodes before and after settling, and what is better."""
+"""caster_gym.tasks.track.metrics: errors of hand-made episodes before and after settling, and what is better."""
 
 import numpy as np
 import pytest
 
-from caster_gym.agents.comparison.track_metrics import TrackMetrics, TrackVerdict, measure
+from caster_gym.tasks.track.metrics import TrackMetrics, TrackVerdict, measure
 from tests.series import STEPS, column, episodes
 
 SETTLING = 2.0  # [s] four steps

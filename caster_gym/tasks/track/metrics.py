@@ -4,11 +4,9 @@ from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
-from caster_gym.agents.comparison.evaluation import Episodes
-from caster_gym.agents.comparison.measuring import Counted, Printed, costs, greatest, mean, overall, rms
 from caster_gym.arrays import Array
-
-SETTLING = 2.0  # [s]
+from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.measuring import Counted, Metrics, Printed, costs, greatest, mean, overall, rms
 
 
 class TrackMetrics(NamedTuple):
@@ -70,3 +68,6 @@ def measure(episodes: Episodes, settling: float) -> TrackMetrics:
         reward=mean(episodes.reward),
         failed=episodes.failed.astype(np.float64),
     )
+
+
+METRICS = Metrics(measure, TrackVerdict, settling=2.0)

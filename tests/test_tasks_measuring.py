@@ -1,11 +1,11 @@
-"""caster_gym.agents.comparison.measuring: what torques cost, means of series with gaps, and what is printed."""
+"""caster_gym.tasks.measuring: what torques cost, means of series with gaps, and what is printed."""
 
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
-from caster_gym.agents.comparison.measuring import Counted, Printed, costs, greatest, mean, overall, rms, shown
+from caster_gym.tasks.measuring import Counted, Printed, costs, greatest, mean, overall, rms, shown
 from tests.series import MOTORS, PERIOD, STEPS, column, episodes
 
 

@@ -1,16 +1,10 @@
 """CasterFollow-v0: follow a path at the robot's own pace, among walls and pillars, with motor torques."""
 
-from typing import Any
-
-from gymnasium.vector import AutoresetMode
-
-from caster_gym.envs.caster_env import CasterEnv
-from caster_gym.envs.caster_vector_env import CasterVectorEnv
-from caster_gym.envs.inputs import check_counts
-from caster_gym.envs.setup import Actuation, ArenaLike, PathLike, RobotLike, follow_engine
+from caster_gym.tasks.environment import TaskEnv, TaskVectorEnv
+from caster_gym.tasks.follow import TASK
 
 
-class CasterFollowEnv(CasterEnv):
+class CasterFollowEnv(TaskEnv):
     """An omnidirectional robot on powered casters follows a path as fast as it may, inside a corridor.
 
     **Progress** is the arc length s of the point of the path nearest to the robot, sought from the progress so far to
@@ -53,7 +47,7 @@ class CasterFollowEnv(CasterEnv):
     robot starts, instead of `time`. A `pose` without it starts at the place of the path that is nearest.
 
     robot, path, actuation, arena, render_mode: as for `CasterTrackEnv`; of a path only its geometry and headings count.
-    All other keywords are fields of `caster_gym.envs.follow_task.FollowTask`, which holds the numbers above.
+    All other keywords are fields of `caster_gym.tasks.follow.parameters.FollowParameters`, with the numbers above.
 
     >>> import caster_gym, gymnasium
     >>> env = gymnasium.make("caster_gym:CasterFollow-v0", path="lemniscate")
@@ -63,19 +57,10 @@ class CasterFollowEnv(CasterEnv):
     ((55,), 0.798, 0.007)
     """
 
-    def __init__(
-        self,
-        robot: RobotLike = "chung2008",
-        path: PathLike = "rounded_square",
-        actuation: Actuation = None,
-        arena: ArenaLike = None,
-        render_mode: str | None = None,
-        **task: Any,
-    ) -> None:
-        super().__init__(*follow_engine(robot, path, actuation, arena, task, 1), render_mode)
+    definition = TASK
 
 
-class CasterFollowVectorEnv(CasterVectorEnv):
+class CasterFollowVectorEnv(TaskVectorEnv):
     """A batch of `CasterFollowEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
 
     max_episode_steps truncates episodes earlier. All other arguments are those of `CasterFollowEnv`; seeds, autoreset
@@ -89,18 +74,4 @@ class CasterFollowVectorEnv(CasterVectorEnv):
     ((16, 55), (16,), (16,))
     """
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        robot: RobotLike = "chung2008",
-        path: PathLike = "rounded_square",
-        actuation: Actuation = None,
-        arena: ArenaLike = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | None = None,
-        render_mode: str | None = None,
-        **task: Any,
-    ) -> None:
-        check_counts(num_envs, max_episode_steps)
-        made = follow_engine(robot, path, actuation, arena, task, num_envs, max_episode_steps)
-        super().__init__(*made, autoreset_mode, render_mode)
+    definition = TASK

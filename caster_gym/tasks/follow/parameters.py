@@ -1,18 +1,15 @@
 """The parameters of the following task."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from caster_gym.configuration import parse
-from caster_gym.envs.following import FollowWeights
-from caster_gym.envs.task import Task
 from caster_gym.paths.trajectory import rounded_up
+from caster_gym.tasks.parameters import TaskParameters
 
 
-class FollowTask(Task):
-    """How a path is to be followed at the robot's own pace, and what that is worth."""
+class FollowParameters(TaskParameters):
+    """How a path is to be followed at the robot's own pace, and how that is rewarded."""
 
     preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
         0.05,
@@ -46,31 +43,9 @@ class FollowTask(Task):
                 f"the window of {self.window:g} m must be at least {rounded_up(2.0 * self.stride, 6):g} m, twice the "
                 "way of a control period at the speed limit"
             )
-        self.check_start()
         return self
 
     @property
     def stride(self) -> float:
         """Way along the path in a control period at the speed limit. [m]"""
         return self.speed_limit * self.control_period
-
-    def weights(self) -> FollowWeights:
-        """The reward's numbers."""
-        return FollowWeights(
-            self.progress_weight,
-            self.cross_track_weight,
-            self.heading_weight,
-            self.effort_weight,
-            self.impact_weight,
-            self.cross_track_scale,
-            self.heading_scale,
-            self.impact_scale,
-            self.coarse,
-            self.corridor,
-            float(self.touching == "ends"),
-        )
-
-
-def read_task(fields: Mapping[str, Any]) -> FollowTask:
-    """A checked task from keyword arguments."""
-    return parse(FollowTask, fields, "the following task")

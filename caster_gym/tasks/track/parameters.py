@@ -1,17 +1,14 @@
 """The parameters of the tracking task."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from caster_gym.configuration import parse
-from caster_gym.envs.task import Task
-from caster_gym.envs.tracking import Weights
+from caster_gym.tasks.parameters import TaskParameters
 
 
-class TrackTask(Task):
-    """How a timed trajectory is to be followed, and what that is worth."""
+class TrackParameters(TaskParameters):
+    """How a timed trajectory is to be followed, and how that is rewarded."""
 
     preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
         0.1,
@@ -37,28 +34,4 @@ class TrackTask(Task):
                     f"preview horizons must be multiples of the control period {self.control_period:g} s, "
                     f"got {horizon:g} s"
                 )
-        self.check_start()
         return self
-
-    def weights(self) -> Weights:
-        """The reward's numbers."""
-        return Weights(
-            self.position_weight,
-            self.heading_weight,
-            self.speed_weight,
-            self.effort_weight,
-            self.impact_weight,
-            self.position_scale,
-            self.heading_scale,
-            self.speed_scale,
-            self.yaw_rate_scale,
-            self.impact_scale,
-            self.coarse,
-            self.corridor,
-            float(self.touching == "ends"),
-        )
-
-
-def read_task(fields: Mapping[str, Any]) -> TrackTask:
-    """A checked task from keyword arguments."""
-    return parse(TrackTask, fields, "the tracking task")

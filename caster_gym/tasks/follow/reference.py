@@ -1,0 +1,168 @@
+"""Paths walked at the robot's own pace: the reference source of the following task."""
+
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from caster_gym.engines.native.lanes import write
+from caster_gym.envs.native.reference import POINT_ROWS, REFERENCE_ROWS
+from caster_gym.envs.plan import PlaceName, Plan, joined
+from caster_gym.envs.tracking import Reference
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.scalars import maximum, minimum
+from caster_gym.paths.specification import AnyPath
+from caster_gym.paths.time_law import row_times
+from caster_gym.robot import Robot
+from caster_gym.tasks.follow.course import Row, arrived_share, at_rest, course_reference, nearest_share
+from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.task import Way
+
+if TYPE_CHECKING:
+    import torch
+
+    from caster_gym.tasks.follow.tensor import TorchCourses
+
+
+class Courses(NamedTuple):
+    """Paths in space, with a time law."""
+
+    samples: Any  # float64 (rows of all courses, 10), as in caster_gym.paths.course
+    spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
+    spacings: Any  # float64 (paths,) [m] between rows
+    horizons: Any  # float64 (previewed points,) [m] ahead
+    window: Any  # [m] how far ahead the nearest point is sought
+    stride: Any  # [m] progress that counts in full, per control period
+    arrival: Any  # [m] before its end, a path counts as done
+    arrival_scale: Any  # [m] distance from the end that halves what staying there is worth
+    free_heading: Any  # 1 if the heading is free, else 0
+    weights: Any = np.zeros(0)  # float64 (weights,), as in FollowWeights
+
+    @property
+    def place(self) -> PlaceName:
+        """Of starts."""
+        return "progress"
+
+    def still(self) -> Self:
+        """The same under which progress stays: nothing is sought."""
+        return self._replace(window=0.0)
+
+    def on_tensors(self, dtype: "torch.dtype", device: "torch.device") -> "TorchCourses":
+        """The same for a batch of tensors."""
+        from caster_gym.tasks.follow.tensor import TorchCourses  # late: most do without Torch
+
+        return TorchCourses(self, dtype, device)
+
+
+def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: FollowParameters) -> tuple[Courses, list[Way]]:
+    """The courses of all paths, with their time laws."""
+    from caster_gym.paths.course import build_courses  # late: only those who follow need it
+
+    courses = build_courses(paths, robot, parameters.speed_limit, parameters.free_heading, margin=parameters.margin)
+    samples, rows = joined([course.samples for course in courses])
+    periods = np.ceil([parameters.allowance * course.duration / parameters.control_period for course in courses])
+    source = Courses(
+        samples,
+        np.column_stack([rows, periods.astype(np.int64)]),
+        np.array([course.spacing for course in courses]),
+        np.array(parameters.preview),
+        parameters.window,
+        parameters.stride,
+        parameters.arrival,
+        parameters.arrival_scale,
+        float(parameters.free_heading),
+    )
+    return source, [
+        Way(
+            course.name,
+            course.samples,
+            course.samples[:, [0, 1, 5, 6]],
+            lambda k, spacing=course.spacing: f"after {k * spacing:.2f} m",  # type: ignore[misc]
+            course.description,
+        )
+        for course in courses
+    ]
+
+
+def facts(plan: Plan) -> dict[str, NDArray[np.float64]]:
+    """Of each path (paths,): goal, the progress with which it is done [m], and law, the time that its law takes [s]."""
+    source = plan.guide
+    lengths = (source.spans[:, 1] - source.spans[:, 0]) * source.spacings
+    laws = [row_times(table[:, -1], spacing)[-1] for table, spacing in zip(plan.tables, source.spacings, strict=True)]
+    return {"goal": lengths - source.arrival, "law": np.array(laws)}
+
+
+def _row(samples: Any, i: Any) -> Row:
+    return (
+        samples[i, 0],
+        samples[i, 1],
+        samples[i, 2],
+        samples[i, 3],
+        samples[i, 4],
+        samples[i, 5],
+        samples[i, 6],
+        samples[i, 7],
+        samples[i, 8],
+        samples[i, 9],
+    )
+
+
+def _nearest(position: Any, path: Any, before: Any, source: Courses) -> float:
+    """Arc length of the point nearest to the robot, from `before` to a window ahead. [m]"""
+    x, y = position
+    base, last, spacing = source.spans[path, 0], source.spans[path, 1], source.spacings[path]
+    first = min(base + int(before / spacing), last - 1)
+    end = min(first + int(source.window / spacing) + 2, last)
+    best, chosen, guess = 1e300, first, 0.0
+    for i in range(first, end):
+        ax, ay = source.samples[i, 0], source.samples[i, 1]
+        bx, by = source.samples[i + 1, 0] - ax, source.samples[i + 1, 1] - ay
+        share = ((x - ax) * bx + (y - ay) * by) / (bx * bx + by * by)
+        share = min(max(share, 0.0), 1.0)
+        dx, dy = x - ax - share * bx, y - ay - share * by
+        distance = dx * dx + dy * dy
+        if distance < best:
+            best, chosen, guess = distance, i, share
+    share = nearest_share(_row(source.samples, chosen), _row(source.samples, chosen + 1), guess, spacing, x, y)
+    if share >= 1.0 and chosen + 1 < end:  # beside the row itself chords on the outer side of a bend are equally near
+        chosen += 1
+        share = nearest_share(_row(source.samples, chosen), _row(source.samples, chosen + 1), 0.0, spacing, x, y)
+    reached = min((chosen - base + share) * spacing, before + source.window)
+    return float(max(reached, before))
+
+
+def _reference_at(path: Any, arc: Any, state: State, source: Courses) -> Reference:
+    """Reference at an arc length [m]; at rest at the end of the path, and turned like the robot if that is free.
+
+    A robot without a heading (0, 0) is one that has not started.
+    """
+    base, last, spacing = source.spans[path, 0], source.spans[path, 1], source.spacings[path]
+    i = min(base + int(arc / spacing), last - 1)
+    share = min(arc / spacing - (i - base), 1.0)
+    reference = course_reference(_row(source.samples, i), _row(source.samples, i + 1), share, spacing)
+    if arc >= (last - base) * spacing:
+        reference = at_rest(reference)
+    c, s = state.heading
+    if source.free_heading * (c * c + s * s) > 0.5:
+        r = reference
+        reference = Reference(r.x, r.y, c, s, r.vx, r.vy, 0.0, r.ax, r.ay, 0.0)
+    return reference
+
+
+def fetch(block: Any, lane: Any, row: Any, state: State, _clock: Any, path: Any, before: Any, source: Courses) -> Any:
+    """Write reference and previewed points of a robot where it is on its path; see `guide_robot`."""
+    length = (source.spans[path, 1] - source.spans[path, 0]) * source.spacings[path]
+    progress = 0.0 if before < 0.0 else _nearest(state.position, path, before, source)
+    reference = _reference_at(path, progress, state, source)
+    r = reference
+    write(block, lane, row, (r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega, r.ax, r.ay, r.alpha))
+    for p in range(len(source.horizons)):
+        r = _reference_at(path, minimum(progress + source.horizons[p], length), state, source)
+        point = (r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega)
+        write(block, lane, row + REFERENCE_ROWS + p * POINT_ROWS, point)
+    share = minimum((progress - maximum(before, 0.0)) / source.stride, 1.0)
+    if progress >= length - source.arrival:
+        x, y = state.position
+        last = _row(source.samples, source.spans[path, 1])
+        share = maximum(share, arrived_share(x, y, last, source.arrival_scale))
+    return progress, share

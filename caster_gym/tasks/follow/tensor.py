@@ -1,0 +1,90 @@
+"""Paths walked at the robots' own pace, for a batch of tensors."""
+
+from typing import cast
+
+import torch
+from torch import Tensor
+
+from caster_gym.envs.tensor.reference import Guidance
+from caster_gym.envs.tracking import Reference
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.scalars import clip, each, maximum, minimum, where
+from caster_gym.tasks.follow.course import Row, arrived_share, at_rest, course_reference, nearest_share
+from caster_gym.tasks.follow.reference import Courses
+
+
+class TorchCourses:
+    """Paths walked at the robots' own pace."""
+
+    def __init__(self, source: Courses, dtype: torch.dtype, device: torch.device) -> None:
+        self.samples = torch.as_tensor(source.samples, dtype=dtype, device=device).T.contiguous()  # (10, rows)
+        self.spans = torch.as_tensor(source.spans, device=device)
+        self._source, self._horizons = source, tuple(source.horizons.tolist())
+        self._spacings = torch.as_tensor(source.spacings, dtype=dtype, device=device)
+        self._lengths = self._spacings * (self.spans[:, 1] - self.spans[:, 0])
+        self._windows = torch.as_tensor((source.window / source.spacings).astype(int) + 2, device=device)
+        self._widest = torch.arange(int((source.window / source.spacings).max()) + 2, device=device)
+
+    def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
+        """Reference and preview at the points of the paths nearest to the robots; before: their progress so far [m]."""
+        source, length = self._source, self._lengths[path]
+        sought = self.nearest(state, path, maximum(before, 0.0))
+        progress = torch.where(before < 0.0, 0.0, sought)
+        reference = self.reference_at(path, progress, state)
+        preview = []
+        for ahead in self._horizons:
+            r = self.reference_at(path, torch.minimum(progress + ahead, length), state)
+            preview.append((r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega))
+        share = minimum((progress - maximum(before, 0.0)) / source.stride, 1.0)
+        last: Row = self._row(self.spans[path, 1])
+        there = arrived_share(*state.position, last, source.arrival_scale)
+        share = torch.where(progress >= length - source.arrival, torch.maximum(share, there), share)
+        return Guidance(reference, tuple(preview), progress, share)
+
+    def _row(self, i: Tensor) -> Row:
+        return cast(Row, self.samples[:, i].unbind(0))
+
+    def nearest(self, state: State, path: Tensor, before: Tensor) -> Tensor:
+        """Arc length of the point nearest to each robot, from `before` to a window ahead. [m]"""
+        x, y = state.position
+        base, last, spacing = self.spans[path, 0], self.spans[path, 1], self._spacings[path]
+        first = torch.minimum(base + (before.detach() / spacing).long(), last - 1)
+        end = torch.minimum(first + self._windows[path], last)
+        with torch.no_grad():
+            rows = first[:, None] + self._widest
+            within = rows < end[:, None]
+            rows = torch.minimum(rows, last[:, None] - 1)
+            ax, ay = self.samples[0, rows], self.samples[1, rows]
+            bx, by = self.samples[0, rows + 1] - ax, self.samples[1, rows + 1] - ay
+            wx, wy = x[:, None] - ax, y[:, None] - ay
+            shares = clip((wx * bx + wy * by) / (bx * bx + by * by), 0.0, 1.0)
+            distance = (wx - shares * bx) ** 2 + (wy - shares * by) ** 2
+            best = torch.where(within, distance, torch.inf).argmin(1)
+            guess = shares.gather(1, best[:, None])[:, 0]
+        chosen = first + best
+        share = nearest_share(self._row(chosen), self._row(chosen + 1), guess, spacing, x, y)
+        # beside a row itself chords on the outer side of a bend are equally near
+        after = torch.minimum(chosen + 1, end - 1)
+        beyond = nearest_share(self._row(after), self._row(after + 1), torch.zeros_like(guess), spacing, x, y)
+        on = (share >= 1.0) & (chosen + 1 < end)
+        chosen, share = torch.where(on, after, chosen), torch.where(on, beyond, share)
+        reached = torch.minimum((chosen - base + share) * spacing, before + self._source.window)
+        return torch.maximum(reached, before)
+
+    def reference_at(self, path: Tensor, arc: Tensor, state: State) -> Reference:
+        """Reference at an arc length [m]; at rest at the end of the path, and turned like the robot if that is free.
+
+        A robot without a heading (0, 0) is one that has not started.
+        """
+        base, last, spacing = self.spans[path, 0], self.spans[path, 1], self._spacings[path]
+        i = torch.minimum(base + (arc.detach() / spacing).long(), last - 1)
+        share = minimum(arc / spacing - (i - base), 1.0)
+        walked = course_reference(self._row(i), self._row(i + 1), share, spacing)
+        done = arc >= (last - base) * spacing
+        reference = Reference(*each(where, (done,), at_rest(walked), walked))
+        if not self._source.free_heading:
+            return reference
+        c, s = state.heading
+        started = c * c + s * s > 0.5
+        free = reference._replace(cos=c, sin=s, omega=0.0 * c, alpha=0.0 * c)
+        return Reference(*each(where, (started,), free, reference))
