@@ -26,14 +26,14 @@ def root(tmp_path, monkeypatch):
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """A package with the folders of caster_gym and one file in each."""
-    for folder in ("mechanics", "engines", "envs", "paths"):
+    for folder in ("mechanics", "engines", "envs", "envs/tensor", "tasks", "paths"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "one.py").write_text("x = 1\n")
     monkeypatch.setattr(compiled_files, "_PACKAGE", tmp_path)
     return tmp_path
 
 
-@pytest.mark.parametrize("folder", ["mechanics", "engines", "envs"])
+@pytest.mark.parametrize("folder", ["mechanics", "engines", "envs", "tasks"])
 def test_a_changed_source_is_another_version(package, folder):
     """Compiled code depends on functions that it calls, in other files."""
     before = compiled_files.source_digest()
@@ -44,7 +44,7 @@ def test_a_changed_source_is_another_version(package, folder):
     assert len({before, changed, compiled_files.source_digest()}) == 3
 
 
-@pytest.mark.parametrize("file", ["paths/one.py", "envs/torch_one.py"])
+@pytest.mark.parametrize("file", ["paths/one.py", "envs/tensor/one.py", "tasks/tensor.py"])
 def test_sources_that_are_not_compiled_do_not_count(package, file):
     before = compiled_files.source_digest()
     (package / file).write_text("x = 2\n")
