@@ -11,6 +11,7 @@ from caster_gym.agents.comparison.figures import write_figures
 from caster_gym.agents.comparison.summary import Result, table, write_episodes, write_summary
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.protocol import Agent
+from caster_gym.tasks.episodes import Episodes
 
 
 class Contender(NamedTuple):
