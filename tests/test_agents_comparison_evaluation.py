@@ -135,12 +135,12 @@ def test_following_ends_at_goals_that_can_be_reached():
     batch = test_batch(FOLLOW, FOLLOW.test, starts=2)
     found = roll_out(tracker(batch), batch, seed=4)
     assert np.isfinite(found.reward).sum(axis=0).tolist() == found.allowed.tolist()
-    assert_allclose(found.allowed * found.period, 1.5 * found.law, atol=found.period)  # rounded up to whole periods
+    assert_allclose(found.allowed * found.period, 1.5 * found.facts["law"], atol=found.period)  # rounded up to whole periods
     reached = np.nanmax(found.progress, axis=0)
-    assert np.all(reached >= found.goal)
-    assert_allclose(reached, found.goal, atol=0.011)  # an arrival of 1 cm before the end, which none passes
-    arrived = (found.progress >= found.goal).argmax(axis=0) * found.period
-    assert_allclose(arrived, found.law, rtol=0.1)
+    assert np.all(reached >= found.facts["goal"])
+    assert_allclose(reached, found.facts["goal"], atol=0.011)  # an arrival of 1 cm before the end, which none passes
+    arrived = (found.progress >= found.facts["goal"]).argmax(axis=0) * found.period
+    assert_allclose(arrived, found.facts["law"], rtol=0.1)
     assert np.all(np.nanmin(found.clearance, axis=0) > 0.0)
     rest = roll_out(Rest(), batch, seed=4)
     assert np.all(np.nanmax(rest.progress, axis=0) < rest.goal)
@@ -149,8 +149,8 @@ def test_following_ends_at_goals_that_can_be_reached():
 def test_a_timetable_has_no_goal():
     batch = test_batch(TASK, TASK.test, starts=1)
     found = roll_out(tracker(batch), batch, seed=4)
-    assert np.isnan(found.goal).all()
-    assert np.isnan(found.law).all()
+    assert np.isnan(found.facts["goal"]).all()
+    assert np.isnan(found.facts["law"]).all()
     assert found.allowed.tolist() == [150, 150, 400]
     assert np.all(np.isnan(found.clearance) | np.isinf(found.clearance))
 
