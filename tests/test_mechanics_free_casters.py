@@ -9,18 +9,16 @@ from caster_gym.mechanics.caster import rates as rolling_rates
 from caster_gym.mechanics.caster_masses import without_friction
 from caster_gym.mechanics.free_casters import (
     border,
-    carry_casters,
     floor_mobility,
     floor_rows,
     own_inertia,
-    slip_dynamics,
     slip_energy,
-    slip_inertia,
     slip_velocity,
 )
 from caster_gym.mechanics.ground import joint_motion
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import pairs
+from tests.free_motion import carry_casters, slip_dynamics, slip_inertia
 from tests.kane_free import FreeKane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
 

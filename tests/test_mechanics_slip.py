@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.mechanics.free_casters import slip_dynamics, slip_energy
+from caster_gym.mechanics.free_casters import slip_energy
 from caster_gym.mechanics.ground import platform_tilt
 from caster_gym.mechanics.integration import State, pack_state, rk4_step
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
@@ -15,6 +15,7 @@ from caster_gym.mechanics.scalars import each, pairs, total
 from caster_gym.mechanics.slip import slip_step
 from caster_gym.mechanics.slip_state import rolling_state, turn_by, unpack_slip_state
 from caster_gym.mechanics.slip_tilt import free_tilt
+from tests.free_motion import slip_dynamics
 from tests.kane_free import FreeKane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
 

@@ -10,12 +10,13 @@ from caster_gym.arena.packing import surroundings
 from caster_gym.floor import Floor
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.floor import Surface, parameters_on
-from caster_gym.mechanics.free_casters import slip_dynamics, slip_energy, slip_velocity
+from caster_gym.mechanics.free_casters import slip_energy, slip_velocity
 from caster_gym.mechanics.grip_or_slip import impact
 from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.separation import Hull, Obstacles
 from caster_gym.mechanics.slip_state import rolling_state
+from tests.free_motion import slip_dynamics
 from tests.kane_free import FreeKane
 
 ROBOTS = ("chung2008", "xr4000", "tidybot2")
