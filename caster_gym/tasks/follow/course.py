@@ -4,12 +4,14 @@ A row of a course, see `caster_gym.paths.course`, is (x, y, t_x, t_y, κ, cos ψ
 between two rows the point is Hermite's cubic, everything else is linear.
 """
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from caster_gym.envs.tracking import Reference, kernel
-from caster_gym.mechanics.scalars import Scalar, clip, each, maximum, sqrt
+from caster_gym.mechanics.scalars import Scalar, clip, each, maximum, minimum, sqrt, where
 
 Row: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+
+Point: TypeAlias = tuple[Scalar, Scalar]
 
 NEWTON_STEPS = 3  # of the projection, from the nearest chord
 
@@ -48,6 +50,15 @@ def bend_between(a: Row, b: Row, share: Scalar, spacing: Scalar) -> tuple[Scalar
         (6.0 - 12.0 * u) * (b[0] - a[0]) + along * a[2] + back * b[2],
         (6.0 - 12.0 * u) * (b[1] - a[1]) + along * a[3] + back * b[3],
     )
+
+
+def chord_share(a: Point, b: Point, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    """Share 0 … 1 of the chord from a to b at which it is nearest to (x, y), and the squared distance there. [m²]"""
+    (ax, ay), (bx, by) = a, b
+    bx, by, dx, dy = bx - ax, by - ay, x - ax, y - ay
+    share = clip((dx * bx + dy * by) / (bx * bx + by * by), 0.0, 1.0)
+    dx, dy = dx - share * bx, dy - share * by
+    return share, dx * dx + dy * dy
 
 
 def nearest_share(a: Row, b: Row, share: Scalar, spacing: Scalar, x: Scalar, y: Scalar) -> Scalar:
@@ -102,3 +113,10 @@ def arrived_share(x: Scalar, y: Scalar, last: Row, scale: Scalar) -> Scalar:
     """What counts as progress at the end of the path: 1 on its last point."""
     ahead, left = last[0] - x, last[1] - y
     return kernel(ahead * ahead + left * left, scale)
+
+
+def progress_share(progress: Scalar, before: Scalar, length: Scalar, position: Point, last: Row, source: Any) -> Scalar:
+    """Progress over that which a period allows; near the end of the path no less than what counts for staying there."""
+    share = minimum((progress - maximum(before, 0.0)) / source.stride, 1.0)
+    there = arrived_share(position[0], position[1], last, source.arrival_scale)
+    return where(progress >= length - source.arrival, maximum(share, there), share)

@@ -10,11 +10,11 @@ from caster_gym.envs.native.reference import POINT_ROWS, REFERENCE_ROWS
 from caster_gym.envs.plan import PlaceName, Plan, joined
 from caster_gym.envs.tracking import Reference
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import maximum, minimum
+from caster_gym.mechanics.scalars import minimum
 from caster_gym.paths.specification import AnyPath
 from caster_gym.paths.time_law import row_times
 from caster_gym.robot import Robot
-from caster_gym.tasks.follow.course import Row, arrived_share, at_rest, course_reference, nearest_share
+from caster_gym.tasks.follow.course import Row, at_rest, chord_share, course_reference, nearest_share, progress_share
 from caster_gym.tasks.follow.parameters import FollowParameters
 from caster_gym.tasks.task import Way
 
@@ -115,12 +115,8 @@ def _nearest(position: Any, path: Any, before: Any, source: Courses) -> float:
     end = min(first + int(source.window / spacing) + 2, last)
     best, chosen, guess = 1e300, first, 0.0
     for i in range(first, end):
-        ax, ay = source.samples[i, 0], source.samples[i, 1]
-        bx, by = source.samples[i + 1, 0] - ax, source.samples[i + 1, 1] - ay
-        share = ((x - ax) * bx + (y - ay) * by) / (bx * bx + by * by)
-        share = min(max(share, 0.0), 1.0)
-        dx, dy = x - ax - share * bx, y - ay - share * by
-        distance = dx * dx + dy * dy
+        a, b = (source.samples[i, 0], source.samples[i, 1]), (source.samples[i + 1, 0], source.samples[i + 1, 1])
+        share, distance = chord_share(a, b, x, y)
         if distance < best:
             best, chosen, guess = distance, i, share
     share = nearest_share(_row(source.samples, chosen), _row(source.samples, chosen + 1), guess, spacing, x, y)
@@ -160,9 +156,5 @@ def fetch(block: Any, lane: Any, row: Any, state: State, _clock: Any, path: Any,
         r = _reference_at(path, minimum(progress + source.horizons[p], length), state, source)
         point = (r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega)
         write(block, lane, row + REFERENCE_ROWS + p * POINT_ROWS, point)
-    share = minimum((progress - maximum(before, 0.0)) / source.stride, 1.0)
-    if progress >= length - source.arrival:
-        x, y = state.position
-        last = _row(source.samples, source.spans[path, 1])
-        share = maximum(share, arrived_share(x, y, last, source.arrival_scale))
-    return progress, share
+    last = _row(source.samples, source.spans[path, 1])
+    return progress, progress_share(progress, before, length, state.position, last, source)

@@ -8,8 +8,8 @@ from torch import Tensor
 from caster_gym.envs.tensor.reference import Guidance
 from caster_gym.envs.tracking import Reference
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import clip, each, maximum, minimum, where
-from caster_gym.tasks.follow.course import Row, arrived_share, at_rest, course_reference, nearest_share
+from caster_gym.mechanics.scalars import each, maximum, minimum, where
+from caster_gym.tasks.follow.course import Row, at_rest, chord_share, course_reference, nearest_share, progress_share
 from caster_gym.tasks.follow.reference import Courses
 
 
@@ -35,10 +35,8 @@ class TorchCourses:
         for ahead in self._horizons:
             r = self.reference_at(path, torch.minimum(progress + ahead, length), state)
             preview.append((r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega))
-        share = minimum((progress - maximum(before, 0.0)) / source.stride, 1.0)
-        last: Row = self._row(self.spans[path, 1])
-        there = arrived_share(*state.position, last, source.arrival_scale)
-        share = torch.where(progress >= length - source.arrival, torch.maximum(share, there), share)
+        last = self._row(self.spans[path, 1])
+        share = progress_share(progress, before, length, state.position, last, source)
         return Guidance(reference, tuple(preview), progress, share)
 
     def _row(self, i: Tensor) -> Row:
@@ -54,11 +52,9 @@ class TorchCourses:
             rows = first[:, None] + self._widest
             within = rows < end[:, None]
             rows = torch.minimum(rows, last[:, None] - 1)
-            ax, ay = self.samples[0, rows], self.samples[1, rows]
-            bx, by = self.samples[0, rows + 1] - ax, self.samples[1, rows + 1] - ay
-            wx, wy = x[:, None] - ax, y[:, None] - ay
-            shares = clip((wx * bx + wy * by) / (bx * bx + by * by), 0.0, 1.0)
-            distance = (wx - shares * bx) ** 2 + (wy - shares * by) ** 2
+            ahead = rows + 1
+            a, b = (self.samples[0, rows], self.samples[1, rows]), (self.samples[0, ahead], self.samples[1, ahead])
+            shares, distance = chord_share(a, b, x[:, None], y[:, None])
             best = torch.where(within, distance, torch.inf).argmin(1)
             guess = shares.gather(1, best[:, None])[:, 0]
         chosen = first + best
