@@ -1,6 +1,7 @@
 """caster_gym.agents.commands.cli: commands work together, and mistakes get a sentence, not a traceback."""
 
 import csv
+import shutil
 
 import pytest
 import yaml
@@ -27,6 +28,27 @@ def call(tmp_path, monkeypatch):
     (tmp_path / "task.yaml").write_text(yaml.safe_dump(TASK), encoding="utf-8")
     runner = CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1", "TERM": "dumb"})
     return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """What a short run of PPO printed, and its folder, which tests copy."""
+    folder = tmp_path_factory.mktemp("trained")
+    (folder / "task.yaml").write_text(yaml.safe_dump(TASK), encoding="utf-8")
+    arguments = [
+        "train",
+        "ppo",
+        *TINY,
+        "--task",
+        str(folder / "task.yaml"),
+        "--seed",
+        "4",
+        "--out",
+        str(folder / "run"),
+    ]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    return result, folder / "run"
 
 
 def assert_refused(result, message):
@@ -152,12 +174,11 @@ def test_a_mistake_is_found_before_anything_is_deleted(call, tmp_path):
         assert (tmp_path / "results" / "precious.txt").is_file()
 
 
-def test_a_policy_is_trained_and_then_evaluated(call, tmp_path):
-    trained = call("train", "ppo", *TINY, "--task", "task.yaml", "--seed", "4", "--out", "run")
-    assert trained.exit_code == 0, trained.output
-    assert "Best on validation paths after" in trained.stdout
-    assert yaml.safe_load((tmp_path / "run" / "run.yaml").read_text(encoding="utf-8"))["seed"] == 4
-    result = call("evaluate", "run/best", "--task", "task.yaml", "--starts", "2", "--out", "results")
+def test_a_policy_is_trained_and_then_evaluated(trained, call, tmp_path):
+    result, run = trained
+    assert "Best on validation paths after" in result.stdout
+    assert yaml.safe_load((run / "run.yaml").read_text(encoding="utf-8"))["seed"] == 4
+    result = call("evaluate", run / "best", "--task", "task.yaml", "--starts", "2", "--out", "results")
     assert result.exit_code == 0, result.output
     table = (tmp_path / "results" / "table.md").read_text(encoding="utf-8")
     assert table in result.stdout
@@ -184,10 +205,9 @@ def test_a_policy_is_evaluated_on_its_own_task_unless_another_is_asked_for(call,
     assert "Task task.yaml; the policy was trained on another one, that of" in other.stdout
 
 
-def test_a_policy_that_does_not_fit_the_task_is_refused(call, tmp_path):
-    assert call("train", "ppo", *TINY, "--task", "task.yaml", "--out", "run").exit_code == 0
+def test_a_policy_that_does_not_fit_the_task_is_refused(trained, call, tmp_path):
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({**TASK, "task": {"preview": [0.1]}}), encoding="utf-8")
-    result = call("evaluate", "run/best", "--task", "other.yaml", "--out", "results")
+    result = call("evaluate", trained[1] / "best", "--task", "other.yaml", "--out", "results")
     assert_refused(result, "the policy needs a preview of (0.1, 0.2, 0.4) s, the task shows (0.1,) s")
 
 
@@ -198,11 +218,10 @@ def test_model_based_control_is_evaluated_by_name(call):
     assert "0 of 2" in result.stdout
 
 
-def test_a_policy_is_not_evaluated_in_the_other_environment(call, tmp_path):
+def test_a_policy_is_not_evaluated_in_the_other_environment(trained, call, tmp_path):
     other = {kind: [{"shape": "circle", "radius": 0.5 + i}] for i, kind in enumerate(TASK)}
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({"environment": "follow", **other}), encoding="utf-8")
-    assert call("train", "ppo", *TINY, "--task", "task.yaml", "--out", "run").exit_code == 0
-    result = call("evaluate", "run/best", "--task", "other.yaml", "--out", "results")
+    result = call("evaluate", trained[1] / "best", "--task", "other.yaml", "--out", "results")
     assert_refused(result, "the policy has learned to follow a timetable")
     assert not (tmp_path / "results").exists()
 
@@ -294,9 +313,9 @@ def assert_refused_at_last(result, message):
     assert "Traceback" not in result.output
 
 
-def test_folders_that_hold_policies_say_where(call, tmp_path):
+def test_folders_that_hold_policies_say_where(trained, call, tmp_path):
     """And what is advised is accepted."""
-    assert call("train", *TINY, "--task", "task.yaml", "--out", "runs/first").exit_code == 0
+    shutil.copytree(trained[1], tmp_path / "runs" / "first")
     last = sorted((tmp_path / "runs" / "first" / "checkpoints").iterdir())[-1].relative_to(tmp_path)
     for given, message in (
         ("runs/first", "is the folder of a training run; give the policy in it that did best, runs/first/best"),

@@ -1,6 +1,9 @@
 """caster_gym.agents.learning.training: runs leave everything behind, repeat, survive an interruption, and learn."""
 
 import csv
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -49,6 +52,40 @@ def run(folder, settings=PPO, seed=3, report=nothing, threads=DEFAULT):
     return train(TASK, settings, seed, folder, report, threads)
 
 
+class Finished(NamedTuple):
+    """A run that is over: where it lies, what it returned, and what was seen while it lasted."""
+
+    folder: Path
+    best: object
+    reports: list  # steps and verdict of each
+    threads: set  # of Torch and of the engine
+    restored: bool  # whether there were as many afterwards as before, 3 of Torch
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The run of a learner by its name, trained once for all tests that only look at it."""
+
+    @cache
+    def finish(name):
+        folder, reports, seen = tmp_path_factory.mktemp(name), [], set()
+
+        def look(*report):
+            reports.append(report)
+            seen.add((torch.get_num_threads(), get_threads()))
+
+        of_process = torch.get_num_threads()
+        torch.set_num_threads(3)
+        try:
+            before = get_threads()
+            best = run(folder, LEARNERS[name], report=look)
+            return Finished(folder, best, reports, seen, (torch.get_num_threads(), get_threads()) == (3, before))
+        finally:
+            torch.set_num_threads(of_process)
+
+    return finish
+
+
 def rows(path):
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
@@ -62,53 +99,54 @@ def same(first, second):
     return all(torch.equal(first[name], second[name]) for name in first)
 
 
-@pytest.mark.parametrize("settings", [PPO, SAC], ids=["ppo", "sac"])
-def test_a_run_leaves_everything_behind(tmp_path, settings):
-    reports = []
-    best = run(tmp_path, settings, report=lambda *report: reports.append(report))
-    history = rows(tmp_path / "validation.csv")
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_a_run_leaves_everything_behind(finished, name):
+    folder, best, reports, *_ = finished(name)
+    settings = LEARNERS[name]
+    history = rows(folder / "validation.csv")
     assert list(history[0]) == ["steps", "seconds", *TrackVerdict._fields]
     steps = [int(row["steps"]) for row in history]
     assert steps == sorted(set(steps))
     assert len(steps) == settings.validations
     assert settings.steps <= steps[-1] < settings.steps + 8 * 64
-    assert sorted(one.name for one in (tmp_path / "checkpoints").iterdir()) == [f"{step:010d}" for step in steps]
+    assert sorted(one.name for one in (folder / "checkpoints").iterdir()) == [f"{step:010d}" for step in steps]
     merits = [(int(row["failures"]), float(row["position_rmse"])) for row in history]
     assert (best.verdict.failures, best.verdict.position_rmse) == min(merits)
-    assert same(weights(tmp_path / "best"), weights(tmp_path / "checkpoints" / f"{best.steps:010d}"))
-    assert load_policy(tmp_path / "best").description.trained_with["steps"] == best.steps
-    assert rows(tmp_path / "progress.csv")
-    assert list(tmp_path.glob("events.out.tfevents.*"))
+    assert same(weights(folder / "best"), weights(folder / "checkpoints" / f"{best.steps:010d}"))
+    assert load_policy(folder / "best").description.trained_with["steps"] == best.steps
+    assert rows(folder / "progress.csv")
+    assert list(folder.glob("events.out.tfevents.*"))
     assert [step for step, _ in reports] == sorted(step for step, _ in reports)
     assert reports[0][1] == ""
     assert "position RMSE" in reports[-1][1]
     assert reports[-1][0] >= steps[0]
 
 
-def test_run_yaml_tells_how_the_result_came_about(tmp_path):
-    run(tmp_path)
-    facts = yaml.safe_load((tmp_path / "run.yaml").read_text(encoding="utf-8"))
+def test_run_yaml_tells_how_the_result_came_about(finished):
+    folder = finished("ppo").folder
+    facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
     assert facts["versions"]["caster_gym"] == caster_gym.__version__
     assert {"commit", "python", "numpy", "torch", "stable-baselines3"} <= set(facts["versions"])
     assert (facts["seed"], facts["threads"], facts["completed"]) == (3, 1, True)
     assert parse(PPOSettings, facts["agent"], "run.yaml") == PPO
     assert parse(TaskSettings, facts["task"], "run.yaml") == TASK
     assert [one["steps"] for one in facts["validations"]] == [
-        int(row["steps"]) for row in rows(tmp_path / "validation.csv")
+        int(row["steps"]) for row in rows(folder / "validation.csv")
     ]
 
 
-@pytest.mark.parametrize("settings", [PPO, SAC], ids=["ppo", "sac"])
-def test_a_seed_repeats_to_the_last_bit_and_another_does_not(tmp_path, settings):
-    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
-        run(tmp_path / name, settings, seed)
-    last = sorted(one.name for one in (tmp_path / "a" / "checkpoints").iterdir())[-1]
-    first, again, other = (weights(tmp_path / name / "checkpoints" / last) for name in "abc")
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_a_seed_repeats_to_the_last_bit_and_another_does_not(finished, tmp_path, name):
+    folders = finished(name).folder, tmp_path / "again", tmp_path / "other"
+    for folder, seed in zip(folders[1:], (3, 4), strict=True):
+        run(folder, LEARNERS[name], seed)
+    last = sorted(one.name for one in (folders[0] / "checkpoints").iterdir())[-1]
+    first, again, other = (weights(folder / "checkpoints" / last) for folder in folders)
     assert same(first, again)
-    assert not any(torch.equal(first[name], other[name]) for name in first)
+    assert not any(torch.equal(first[layer], other[layer]) for layer in first)
     measured = ["steps", *TrackVerdict._fields]
-    a, b = (rows(tmp_path / name / "validation.csv") for name in "ab")
-    assert [[row[name] for name in measured] for row in a] == [[row[name] for name in measured] for row in b]
+    a, b = (rows(folder / "validation.csv") for folder in folders[:2])
+    assert [[row[key] for key in measured] for row in a] == [[row[key] for key in measured] for row in b]
 
 
 def recorded(folder, name):
@@ -118,39 +156,41 @@ def recorded(folder, name):
     return {event.step: event.value for event in events.Scalars(name)}
 
 
-@pytest.mark.parametrize("settings", LEARNERS.values(), ids=LEARNERS)
-def test_every_validation_is_recorded_at_its_own_step(tmp_path, settings):
+@pytest.mark.parametrize("name", LEARNERS)
+def test_every_validation_is_recorded_at_its_own_step(finished, name):
     """Also the last one, after which SB3 dumps nothing, and several between two of its dumps."""
-    best = run(tmp_path, settings)
-    history = rows(tmp_path / "validation.csv")
-    in_csv = [row for row in rows(tmp_path / "progress.csv") if row["validation/position_rmse"]]
-    for name in ("position_rmse", "failures", "seconds"):
-        validated = {int(row["steps"]): float(row[name]) for row in history}
-        assert {int(row["time/total_timesteps"]): float(row[f"validation/{name}"]) for row in in_csv} == validated
-        by_board = recorded(tmp_path, f"validation/{name}")
+    folder, best, *_ = finished(name)
+    history = rows(folder / "validation.csv")
+    in_csv = [row for row in rows(folder / "progress.csv") if row["validation/position_rmse"]]
+    for quantity in ("position_rmse", "failures", "seconds"):
+        validated = {int(row["steps"]): float(row[quantity]) for row in history}
+        assert {int(row["time/total_timesteps"]): float(row[f"validation/{quantity}"]) for row in in_csv} == validated
+        by_board = recorded(folder, f"validation/{quantity}")
         assert by_board == pytest.approx(validated, rel=1e-6)  # TensorBoard keeps single precision
         assert {best.steps, max(validated)} <= by_board.keys()
     assert len(in_csv) == len(history)
-    others = [row for row in rows(tmp_path / "progress.csv") if not row["validation/position_rmse"]]
+    others = [row for row in rows(folder / "progress.csv") if not row["validation/position_rmse"]]
     assert others
     assert all(int(row["time/total_timesteps"]) > 0 for row in others)
 
 
-@pytest.mark.parametrize("settings", LEARNERS.values(), ids=LEARNERS)
-@pytest.mark.parametrize("threads", [None, 2])
-def test_training_takes_one_thread_or_as_many_as_are_asked_for(tmp_path, settings, threads):
-    """Whatever the process has; run.yaml says how many, and afterwards they are as before."""
+def threads_of_the_record(folder):
+    return yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))["threads"]
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_training_takes_one_thread_whatever_the_process_has(finished, name):
+    """run.yaml says how many, and afterwards they are as before."""
+    one = finished(name)
+    assert (one.threads, threads_of_the_record(one.folder), one.restored) == ({(1, 1)}, 1, True)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_training_takes_as_many_threads_as_are_asked_for(tmp_path, name):
     before, seen = (torch.get_num_threads(), get_threads()), set()
-    torch.set_num_threads(3)
-    try:
-        chosen = {} if threads is None else {"threads": threads}
-        run(tmp_path, settings, report=lambda *_: seen.add((torch.get_num_threads(), get_threads())), **chosen)
-        assert torch.get_num_threads() == 3
-    finally:
-        torch.set_num_threads(before[0])
-    assert get_threads() == before[1]
-    assert seen == {(threads or 1, threads or 1)}
-    assert yaml.safe_load((tmp_path / "run.yaml").read_text(encoding="utf-8"))["threads"] == (threads or 1)
+    run(tmp_path, LEARNERS[name], report=lambda *_: seen.add((torch.get_num_threads(), get_threads())), threads=2)
+    assert (torch.get_num_threads(), get_threads()) == before
+    assert (seen, threads_of_the_record(tmp_path)) == ({(2, 2)}, 2)
 
 
 def test_an_interruption_keeps_what_was_learned(tmp_path):

@@ -94,7 +94,7 @@ def test_episodes_are_those_of_the_compiled_batch(task):
 @pytest.mark.parametrize("task", list(IDS))
 def test_episodes_among_obstacles_are_those_of_the_compiled_batch(task):
     """Pillars and walls beside two paths, in a room: impacts and lasting contacts."""
-    *_, impacts = assert_same_episodes(*both(task, 4, arena=OBSTACLES, corridor=0.6, nearest=2), 10, 1.5)
+    *_, impacts = assert_same_episodes(*both(task, 4, arena=OBSTACLES, corridor=0.6, nearest=3), 10, 1.5)
     assert impacts >= 1
 
 

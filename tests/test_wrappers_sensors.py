@@ -162,7 +162,7 @@ def test_steering_noise_turns_every_direction():
 
 
 def test_obstacles_are_seen_from_where_the_robot_is():
-    task = {"path": PATH, "corridor": 100.0, "arena": {"pillars": [{"centre": [1.0, 0.0]}]}, "nearest": 1}
+    task = {"path": PATH, "corridor": 100.0, "arena": {"pillars": [{"centre": [1.0, 0.0]}]}, "nearest": 3}
     noisy, clean = (wrap(CasterTrackVectorEnv(5, **task), *f) for f in ([SensorNoise(position=0.1, heading=0.3)], []))
     layout = clean.unwrapped.engine.layout
     shown, true = moving(noisy), moving(clean)
