@@ -5,6 +5,7 @@ from collections import Counter
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # there is one worker for each core
     os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ["OMP_WAIT_POLICY"] = "PASSIVE"  # where a test asks for two threads, none spins while it waits
 
 
 def pytest_collection_modifyitems(items):

@@ -77,6 +77,7 @@ def finished(settings, tmp_path_factory):
     return folder, run_benchmark(read_comparison(settings, {"steps": 512}), folder)
 
 
+@pytest.mark.slow
 def test_a_comparison_leaves_everything_behind(finished):
     folder, text = finished
     assert (folder / "table.md").read_text(encoding="utf-8") == text + "\n"
@@ -95,6 +96,7 @@ def test_a_comparison_leaves_everything_behind(finished):
     assert len(rows(folder / "summary.csv")) == 2 * len(TrackMetrics._fields)
 
 
+@pytest.mark.slow
 def test_run_yaml_holds_what_the_comparison_was(finished, settings):
     folder, _ = finished
     facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
@@ -105,6 +107,7 @@ def test_run_yaml_holds_what_the_comparison_was(finished, settings):
     assert facts["tuned"][controller]["natural_frequencies"] == [15.0]
 
 
+@pytest.mark.slow
 def test_every_seed_is_trained_for_itself(finished):
     folder, _ = finished
     policies = sorted(file.parent for file in (folder / "policies").rglob("run.yaml"))
@@ -117,6 +120,7 @@ def test_every_seed_is_trained_for_itself(finished):
         assert history[-1].steps == 512
 
 
+@pytest.mark.slow
 def test_episodes_can_be_measured_again_from_the_policies(finished, settings, task):
     """The numbers of each seed are those of its policy on the same starts."""
     folder, _ = finished
@@ -171,6 +175,7 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
     assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
 
 
+@pytest.mark.slow
 def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
     """Here the folder of a run cannot be made, since a file is there."""
     (tmp_path / "taken").write_text("", encoding="utf-8")
@@ -198,6 +203,7 @@ def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, 
     assert submitted == 5 * [threads[0] if threads else 1]
 
 
+@pytest.mark.slow
 def test_run_yaml_has_the_threads_of_everybody(finished):
     folder, _ = finished
     files = [folder / "run.yaml", *(folder / "policies").rglob("run.yaml")]
@@ -216,6 +222,7 @@ def test_an_unknown_agent_is_told_before_anything_is_trained(tmp_path, settings)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_following_is_compared_in_the_same_way(tmp_path):
     """One definition serves both tasks: another table, another figure, the same files."""
     task = {

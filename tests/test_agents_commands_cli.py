@@ -190,6 +190,7 @@ def test_a_policy_is_trained_and_then_evaluated(trained, call, tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_a_policy_is_evaluated_on_its_own_task_unless_another_is_asked_for(call, tmp_path):
     slippery = {**TASK, "task": {"floor": {"friction": 0}}}
     (tmp_path / "ice.yaml").write_text(yaml.safe_dump(slippery), encoding="utf-8")
@@ -270,6 +271,7 @@ def test_completion_is_offered(call):
     assert "--install-completion" in call("--help").stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -420,6 +422,7 @@ def test_a_missing_library_is_named_with_its_extra(call, monkeypatch):
     assert_refused(call("design"), "this needs the Python package 'torch': pip install 'caster_gym[train]'")
 
 
+@pytest.mark.slow
 def test_threads_are_those_asked_for_and_in_run_yaml(call, tmp_path):
     arguments = ["--task", "task.yaml", "--threads", "2", "--out"]
     assert call("train", *TINY, *arguments, "run").exit_code == 0

@@ -55,6 +55,7 @@ def window(setup, monkeypatch):
     pygame.display.quit()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_film_shows_one_episode_from_start_to_end(setup, suffix):
     file = setup / f"run{suffix}"

@@ -159,6 +159,7 @@ def with_features(settings, **features):
     return parse(TaskSettings, {**settings.model_dump(mode="json"), **features}, "task")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [TASK, FOLLOW], ids=["track", "follow"])
 def test_rewards_are_those_of_the_task_alone(settings):
     """Terms that wrappers or shaping add change no episode and no reward that is told."""

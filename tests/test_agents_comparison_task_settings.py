@@ -33,6 +33,7 @@ def written(tmp_path, content):
     return str(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", names("tasks"))
 def test_each_task_that_comes_with_the_package_loads(name):
     task = read_settings(TaskSettings, "tasks", name)

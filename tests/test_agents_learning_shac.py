@@ -149,6 +149,7 @@ def test_targets_do_not_look_beyond_an_ending():
     assert td_lambda(window, 0.5, 1.0)[:, 0].tolist() == [1.5, 1.0, 4.5]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*singular")
 def test_policies_get_better():
     """Mean reward of half a second from the same starts at rest, with a critic that expects nothing and learns nothing.

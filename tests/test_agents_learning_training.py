@@ -135,6 +135,7 @@ def test_run_yaml_tells_how_the_result_came_about(finished):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ppo", "sac"])
 def test_a_seed_repeats_to_the_last_bit_and_another_does_not(finished, tmp_path, name):
     folders = finished(name).folder, tmp_path / "again", tmp_path / "other"
@@ -185,6 +186,7 @@ def test_training_takes_one_thread_whatever_the_process_has(finished, name):
     assert (one.threads, threads_of_the_record(one.folder), one.restored) == ({(1, 1)}, 1, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEARNERS)
 def test_training_takes_as_many_threads_as_are_asked_for(tmp_path, name):
     before, seen = (torch.get_num_threads(), get_threads()), set()
@@ -210,6 +212,7 @@ def test_an_interruption_keeps_what_was_learned(tmp_path):
     assert same(weights(tmp_path / "best"), bundle.agent.actor.state_dict())
 
 
+@pytest.mark.slow
 def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     """The default settings with less than a third of their steps, on the 64 test paths of the default task.
 

@@ -120,6 +120,7 @@ def test_a_robot_that_only_turns_gets_its_obstacles_too():
     assert ((gaps.min(0) >= LEAST - ROUNDING) & (gaps.min(0) <= GREATEST + ROUNDING)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "asked", [{"pillars": 90, "walls": 2}, {"pillars": 1, "walls": 30}, {"pillars": 12, "gap": [1, 2]}], ids=str
 )

@@ -36,6 +36,7 @@ def cheat(batch, name):
     return Cheat(batch.engine.layout, batch.task.control_period, CHEATS[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHEATS)
 def test_no_cheat_earns_what_computed_torque_earns(task, name):
     """On no path and from no start; by a tenth at least, so that it is no matter of luck."""
@@ -103,6 +104,7 @@ def configured(request):
     return batch, plain, scores(agent, honest, SEED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHEATS)
 def test_no_cheat_is_paid_under_the_shaping_of_a_configuration(configured, name):
     """The same as above, of what a policy is trained on."""

@@ -145,6 +145,7 @@ def test_what_cannot_be_designed_is_refused_when_settings_are_read(robot, change
         read_design("indoor", robot, changes)
 
 
+@pytest.mark.slow
 def test_the_page_of_least_torque_says_at_what_speed_it_is_bought():
     bounds = {"radius": [0.02, 0.03], "trail": [0.02, 0.03], "paths": []}
     report = make_design(read_design("indoor", changes={"objective": "torque", **bounds}))

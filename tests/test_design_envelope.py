@@ -80,6 +80,7 @@ def test_a_start_reaches_the_flip_speed_on_a_way_of_one_trail():
     assert flip_speed(ROBOT, Target(**{**LIMITS, "acceleration": 100.0})) == 1.0  # never above the top speed
 
 
+@pytest.mark.slow
 def test_no_acceleration_within_the_limits_asks_more_and_one_asks_as_much():
     """(S3): torques by the pseudo-inverse of the wrenches for accelerations all around.
 
@@ -102,6 +103,7 @@ def test_no_acceleration_within_the_limits_asks_more_and_one_asks_as_much():
         assert_allclose(np.maximum(loads.along, loads.against)[:, k], hardest, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_best_way_of_sharing_is_that_of_a_linear_programme():
     """(S4): minimise t with −t <= u <= t and W u = F, at the worst of accelerations all around (1° apart)."""
     target = Target(**LIMITS)

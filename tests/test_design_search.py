@@ -81,6 +81,7 @@ def test_with_all_joints_driven_alike_the_best_radius_equals_the_trail(even):
     assert even.bounds == ("the room between the wheels",)
 
 
+@pytest.mark.slow
 def test_no_design_of_a_grid_needs_less_of_the_motors(strong):
     """Two per mille: motions were added for the best design alone, and its neighbours are easier without them."""
     design, _ = strong
@@ -93,6 +94,7 @@ def test_no_design_of_a_grid_needs_less_of_the_motors(strong):
     assert design.value < design.own[2]
 
 
+@pytest.mark.slow
 def test_no_design_of_a_grid_needs_less_torque(light):
     """Every design of a grid, by torque over the file's. The corner is the optimum; the search stops 1e-5 beside it."""
     sizes = np.array([[motor.max_torque] for caster in ROBOT.casters for motor in (caster.roll, caster.steer)])
@@ -118,6 +120,7 @@ def test_least_torque_runs_to_the_smallest_wheels_and_trails_and_pays_in_speed(l
     assert max(m.torque / m.has_torque for m in fast.motors) == pytest.approx(light.value, rel=6e-3)  # as for use
 
 
+@pytest.mark.slow
 def test_the_least_use_keeps_away_from_wheels_that_turn_too_fast():
     slow = [
         caster.model_copy(
@@ -260,6 +263,7 @@ def test_casters_that_differ_are_refused():
         optimise(random_robot(0, 3), EVEN)
 
 
+@pytest.mark.slow
 def test_motors_that_are_too_slow_for_every_design_are_refused():
     target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "use", "speed": 20.0})
     with pytest.raises(ValueError, match=r"no design within the bounds reaches the target.* would do") as error:

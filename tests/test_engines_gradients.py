@@ -47,6 +47,7 @@ def moving(count, n, seed=1):
     return torch.cat((free[:, :2], units[:, 0], free[:, 2:], units[:, 1:].flatten(1)), 1)
 
 
+@pytest.mark.slow
 def test_a_rollout_of_the_bare_mechanics():
     """20 steps, with respect to torques and initial velocities."""
     robot = random_robot(1, 3)
@@ -71,6 +72,7 @@ def parameterised(robot, name, value):
     return numbers._replace(casters=tuple(caster._replace(**{name: value}) for caster in numbers.casters))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["mass", "inertia", "trail", "radius", "wheel_mass", "roll_viscous", "roll_coulomb", "scrub"]
 )
@@ -127,6 +129,7 @@ def test_rewards_with_respect_to_the_initial_state(task):
     assert_slope_agrees(lambda it: rollout(task, start._replace(bodies=it), actions)[0], start.bodies)
 
 
+@pytest.mark.slow
 def test_following_rewards_with_respect_to_actions():
     """Through the projection on the path, from 20 periods on the way; 1e-4: Newton's steps stop near its root."""
     task = TorchTask("follow", path=CIRCLE, fields={"corridor": 1.0}, dtype=torch.float64)
@@ -170,6 +173,7 @@ def before_a_wall():
     return task, state._replace(bodies=bodies, room=torch.zeros_like(state.room))
 
 
+@pytest.mark.slow
 def test_through_an_impact(before_a_wall):
     """With respect to velocities and torques, through the time of the impact and its impulse with friction.
 

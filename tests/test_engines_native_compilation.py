@@ -112,6 +112,7 @@ print(compiled(tripled, lambda types: Work("a test", 1.0))(2))
 """
 
 
+@pytest.mark.slow
 def test_processes_that_start_together_compile_once(tmp_path):
     """One compiles and says so, the others wait and may say that."""
     (tmp_path / "together.py").write_text(TOGETHER)

@@ -49,6 +49,7 @@ def test_the_number_of_threads_is_positive():
         set_threads(0)
 
 
+@pytest.mark.slow
 def test_stepping_a_batch_leaves_the_pool_of_numba_asleep():
     """It shares OpenMP's settings with Torch: once it is awake, training on one thread spins on all cores."""
     code = (

@@ -74,6 +74,7 @@ def random_torques(seed, count, size=1.0):
     return np.random.default_rng((seed, 1)).uniform(-size, size, (count, 6)) * np.tile([0.1, 0.05], 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["disc", "box"])
 def test_all_engines_agree_over_several_impacts(name):
     robot = robot_of(SHAPES[name])
