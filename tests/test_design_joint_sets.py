@@ -96,6 +96,7 @@ def test_every_somewhere_is_shown(seed):
             np.testing.assert_allclose(met.point, one.point, atol=1e-9)  # lines may cross at small angles
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(16))
 def test_a_blind_search_agrees(seed):
     """(L6): it reaches zero where the geometry says somewhere, and does not where it says never."""

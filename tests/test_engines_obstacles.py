@@ -131,6 +131,7 @@ def test_one_robot_among_obstacles_equals_the_same_robot_in_a_batch(name):
         assert_array_equal(alone.state[0], together[i])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [Model, TorchModel])
 def test_a_batch_of_a_model_among_obstacles_equals_its_single_robots(engine):
     robot = robot_of(SHAPES["box"])
@@ -206,6 +207,7 @@ def outline_in_world(outline, states):
     return np.stack([x + c * px - s * py, y + s * px + c * py], -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.3])
 @pytest.mark.parametrize("outline", SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
@@ -251,6 +253,7 @@ def test_a_robot_that_leans_against_a_wall_stays_where_it_rests():
         assert (abs(fleet.state[:, 3:7]) < ALLOWED).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["triangle", "box"])
 def test_robots_jammed_between_obstacles_do_not_sink_in(name):
     """Pushed for long, without bounce or friction, at the longest time step that the robot allows."""
@@ -276,6 +279,7 @@ LONG_RUN = [  # outline, restitution, friction
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "restitution", "friction"), LONG_RUN)
 def test_nothing_leaves_a_room_or_gains_energy_in_two_million_steps(name, restitution, friction):
     """Random torques, held for random times; every tenth step is looked at closely.

@@ -140,7 +140,7 @@ def test_gradients_pass_through_a_slipping_step():
 
 
 def test_each_robot_may_have_its_own_numbers():
-    robots = [random_robot(seed, 2) for seed in (11, 12)]
+    robots = [random_robot(seed, 3) for seed in (11, 12)]
     fleet = Fleet(robots, floor=Floor())
     state = np.concatenate([starts(robot, 1, seed)[0] for seed, robot in enumerate(robots)])
     torque = np.concatenate([starts(robot, 1, seed)[2] for seed, robot in enumerate(robots)])

@@ -23,6 +23,7 @@ def both(robots, count=None, **arguments):
     return theirs, ours, rng.uniform(-0.02, 0.02, (theirs.count, 2 * theirs.robots[0].caster_count))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("caster_count", [2, 3, 4])
 def test_500_steps_agree_with_numba(caster_count):
     """1e-10 of order 1: rounding is 1e-16, and the motion spreads it less than a million times."""
@@ -32,6 +33,7 @@ def test_500_steps_agree_with_numba(caster_count):
     assert_allclose(ours.state, theirs.state, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_single_precision_stays_within_a_tenth_of_a_millimetre():
     """1.2e-7 a step, over 500 steps at random signs 3e-6; the motion spreads that about thirty times."""
     theirs, ours, torque = both(load_robot("chung2008"), 20)
@@ -86,6 +88,7 @@ def test_wrong_shapes_and_steps_are_refused():
         fleet.step(torch.zeros((4, 6)), 0.02)
 
 
+@pytest.mark.slow
 def test_a_compiled_fleet_agrees_with_an_eager_one():
     """The compiler keeps the order of roundings, not their number: 1e-12 of order 1 after 20 steps."""
     robot = random_robot(3, 2)

@@ -187,6 +187,7 @@ def test_stiff_robots_are_refused_by_every_engine(case):
             use()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", STIFF)
 def test_the_number_of_substeps_that_a_refusal_names_would_do(case):
     """It is accepted, one less is not, and 1,000 random steps are then finite, no wilder than with three times it."""

@@ -107,6 +107,7 @@ def test_wrappers_of_gymnasium_are_copied_with_what_is_inside(made, way):
     assert env.get_wrapper_attr("_elapsed_steps") == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", list(WAYS))
 @pytest.mark.parametrize(("kind", "mode"), [("track", "rgb_array"), ("wrapped", "rgb_array"), ("tracks", "grid")])
 def test_copies_draw_as_their_original(kind, mode, way):
@@ -156,6 +157,7 @@ def test_the_environment_of_sb3_is_copied_with_its_batch():
                 np.testing.assert_array_equal(mine, its)
 
 
+@pytest.mark.slow
 def test_another_process_goes_on_with_a_pickled_environment(tmp_path):
     env = mid_episode(gym.make("caster_gym:CasterTrack-v0", **TASK))
     (tmp_path / "env.pkl").write_bytes(pickle.dumps(env))

@@ -58,6 +58,7 @@ def test_drawing_before_the_first_reset_is_refused(kind):
         env.render()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "mode"), [*((kind, "rgb_array") for kind in SINGLE), *((kind, "grid") for kind in BATCH)]
 )
@@ -88,6 +89,7 @@ def test_a_grid_shows_up_to_sixteen_robots():
     assert (few.render() != before).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "single"), list(zip(BATCH, SINGLE, strict=True)))
 def test_a_batch_draws_each_robot_as_its_single_environment(kind, single):
     """To the last pixel, on paths of their own, with what has happened since the reset; SyncVectorEnv agrees."""
@@ -132,6 +134,7 @@ def test_what_was_written_into_an_info_is_not_drawn(kind):
     np.testing.assert_array_equal(ours.render(), theirs.render())
 
 
+@pytest.mark.slow
 def test_gymnasium_films_a_batch(tmp_path):
     """Its RecordVideo puts the frames of all robots side by side."""
     env = gym.make_vec("caster_gym:CasterFollow-v0", num_envs=4, path=PATH, render_mode="rgb_array")

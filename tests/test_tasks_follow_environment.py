@@ -92,6 +92,7 @@ def singles(count, mode, **arguments):
     return SyncVectorEnv([lambda: TimeLimit(CasterFollowEnv(**made), LONGEST)] * count, autoreset_mode=mode)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("touching", ["allowed", "ends"])
 def test_a_batch_equals_single_environments(mode, touching):
