@@ -62,7 +62,7 @@ def train(
     change: Changes = None,
     threads: Threads = 1,
 ) -> None:
-    """Train a policy; the best one on validation paths is OUT/best, a folder that `evaluate` reads."""
+    """Train a policy. The best one on validation paths is saved in OUT/best, which `evaluate` and `watch` read."""
     with plain_errors():
         from caster_gym.agents.comparison.metrics import in_words
         from caster_gym.agents.learning.training import train as run
@@ -94,7 +94,7 @@ def evaluate(
     overwrite: Overwrite = False,
     threads: Threads = 1,
 ) -> None:
-    """Try an agent on the test paths of a task, a policy on those of its own: a table, all episodes as CSV, figures."""
+    """Evaluate an agent on the test paths of a task, and write a table, all episodes as CSV, and figures."""
     with plain_errors():
         from caster_gym.agents.commands.evaluate import evaluate as run
 
@@ -134,14 +134,18 @@ def watch(
         ),
     ] = "computed_torque",
     task: TrainedTask = None,
-    path: Annotated[str, typer.Option(help="Name or index of a test path; the first robot's, of several.")] = "0",
-    robots: Annotated[int, typer.Option(help="How many, each on a test path of its own.", min=1, max=16)] = 1,
+    path: Annotated[
+        str, typer.Option(help="Name or index of a test path; with several robots, that of the first.")
+    ] = "0",
+    robots: Annotated[int, typer.Option(help="Number of robots, each on its own test path.", min=1, max=16)] = 1,
     seed: Annotated[int, typer.Option(help="Seed of the starts.", min=0, max=2**32 - 1)] = 0,
-    save: Annotated[Path | None, typer.Option(help="Film to write instead of a window: run.mp4 or run.gif.")] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write a film instead of opening a window: run.mp4 or run.gif.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a film that is there.")] = False,
-    seconds: Annotated[float | None, typer.Option(help="Stop after that time.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after this time [s].")] = None,
 ) -> None:
-    """Show an agent on the test paths of a task, a policy on its own, or drive yourself: in a window or a film."""
+    """Show an agent on the test paths of a task, in a window or a film, or drive the robot yourself."""
     with plain_errors():
         from caster_gym.agents.commands.selection import choose_task
         from caster_gym.agents.commands.watch import watch as run
@@ -157,7 +161,8 @@ def watch(
 @app.command()
 def design(
     robot: Annotated[
-        str | None, typer.Option(help="Name of a robot in configs/robots, or path of a YAML file; else the target's.")
+        str | None,
+        typer.Option(help="Name of a robot in configs/robots, or path of a YAML file. Default: that of the target."),
     ] = None,
     target: Annotated[
         str, typer.Option(help="Name of a target in configs/designs, or path of a YAML file.")
@@ -186,15 +191,15 @@ def identify(
         Path | None, typer.Argument(help="CSV file of a recording; --example shows the format.")
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="The robot as it is thought to be: its name, or path of a YAML file.")
+        str, typer.Option(help="The robot as far as it is known: its name, or path of a YAML file.")
     ] = "chung2008",
     unknown: Annotated[
         list[str] | None,
         typer.Option(
             help="What to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
             "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail, radius, steering_zero, "
-            "roll_strength, steer_strength (of all casters, or as radius_2 of one; radii, trails, steering_zeros of "
-            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Without it: mass and place "
+            "roll_strength, steer_strength (for all casters; radius_2 for one; radii, trails, steering_zeros for "
+            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Default: mass and place "
             "of a payload."
         ),
     ] = None,
@@ -207,7 +212,7 @@ def identify(
         typer.Option("--set", help="Change a setting, e.g. --set window=0.5 or --set 'noise={position: 0.001}'."),
     ] = None,
 ) -> None:
-    """Payload, friction, wheels, motors and zeros of a robot from a recording, with intervals, and a robot file."""
+    """Estimate payload, friction, wheels, motors and sensor zeros of a robot from a recording, with intervals."""
     with plain_errors(NOTHING_WRITTEN):
         from caster_gym.identification import PAYLOAD, identify_file, read_identify, write_example
 
@@ -233,13 +238,11 @@ def export(
     ] = 2e-3,
     friction: Annotated[
         float,
-        typer.Option(
-            help="Coefficient of friction between wheels and floor [-]; a great one comes nearest to rolling."
-        ),
+        typer.Option(help="Coefficient of friction between wheels and floor [-]; a high one comes closest to rolling."),
     ] = 5.0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
 ) -> None:
-    """Write a robot as a model for MuJoCo (MJCF): bodies, joints, gears and motors, wheels that roll by friction."""
+    """Write a robot as a MuJoCo model (MJCF), with bodies, joints, gears, motors, and wheels that roll by friction."""
     with plain_errors():
         from caster_gym.export.mjcf import mjcf as model
         from caster_gym.robot import load_robot
@@ -265,7 +268,7 @@ def warm(
         list[int] | None, typer.Option(help="Number of casters of some other robot; may be repeated.")
     ] = None,
 ) -> None:
-    """Compile ahead what robots and tasks need, those that come with the package unless others are named."""
+    """Compile code for robots and tasks ahead; by default for all that come with the package."""
     with plain_errors("what was compiled is kept; the same command goes on from there"):
         from caster_gym.agents.commands.warm import read_pieces
         from caster_gym.agents.commands.warm import warm as run

@@ -26,7 +26,7 @@ TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or
 TrainedTask = Annotated[
     str | None,
     typer.Option(
-        help="Name of a task in configs/tasks, or path of a YAML file; without it, the one that the policy was trained "
+        help="Name of a task in configs/tasks, or path of a YAML file. Default: the task that the policy was trained "
         "on, else track."
     ),
 ]
@@ -35,7 +35,7 @@ Threads = Annotated[
     typer.Option(
         min=1,
         max=MOST_THREADS,
-        help="Threads of each process, for networks and simulation; results depend on their number.",
+        help="Threads of each process, for networks and simulation. Results depend on their number.",
     ),
 ]
 
