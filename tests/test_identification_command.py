@@ -20,8 +20,8 @@ from caster_gym.identification.command import (
     write_identification,
 )
 from caster_gym.identification.fit import identify
-from caster_gym.identification.recording import read_recording
 from caster_gym.identification.recording_check import ContradictionError
+from caster_gym.identification.recording_table import read_recording
 from caster_gym.identification.unknowns import unknowns
 from caster_gym.robot import load_robot
 from caster_gym.tasks.track.environment import CasterTrackEnv

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.engines.numpy_model import Model
-from caster_gym.identification.recording import KINDS, Noise, read_recording, record, write_recording
+from caster_gym.identification.recording import KINDS, Noise, record, write_recording
+from caster_gym.identification.recording_table import read_recording
 from caster_gym.robot import load_robot
 from tests.random_robots import random_robot
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.identification.recording import read_recording, record, write_recording
-from caster_gym.identification.recording_table import FEWEST_ROWS
+from caster_gym.identification.recording import FEWEST_ROWS, record, write_recording
+from caster_gym.identification.recording_table import read_recording
 from caster_gym.robot import load_robot
 from caster_gym.tables import TableNote
 

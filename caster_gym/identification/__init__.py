@@ -8,7 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from caster_gym.identification.command import PAYLOAD, IdentifySettings, identify_file, read_identify, write_example
-from caster_gym.identification.recording import Noise, Recording, read_recording, record, write_recording
+from caster_gym.identification.recording import Noise, Recording, record, write_recording
+from caster_gym.identification.recording_table import read_recording
 from caster_gym.identification.unknowns import robot_with
 
 if TYPE_CHECKING:

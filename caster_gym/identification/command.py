@@ -12,8 +12,9 @@ import yaml
 from pydantic import Field, PositiveFloat
 
 from caster_gym.configuration import Frozen, parse
-from caster_gym.identification.recording import KIND_UNITS, Noise, read_recording, record, write_recording
+from caster_gym.identification.recording import KIND_UNITS, Noise, record, write_recording
 from caster_gym.identification.recording_check import ContradictionError, check_recording
+from caster_gym.identification.recording_table import read_recording
 from caster_gym.identification.unknowns import (
     CONFIDENCE,
     UNITS,

@@ -128,14 +128,7 @@ def _columns(name: str, count: int) -> Iterator[Mend]:
                 lambda r, which=which, factor=factor: _scaled(r, name, dict.fromkeys(which, factor)),  # type: ignore[misc, arg-type]
                 name,
             )
-    for order in _orders(count):
-        moved = [(i, j) for i, j in enumerate(order) if i != j]
-        yield Mend(
-            f"{listed(f'{name}_{i + 1}' for i, _ in moved)} are columns of other casters",
-            "call " + listed(f"{name}_{j + 1} {name}_{i + 1}" for i, j in moved) + _TORQUES_TOO,
-            lambda r, order=list(order): replace(r, **{name: getattr(r, name)[:, order]}),  # type: ignore[misc]
-            name,
-        )
+    yield from (_reordered((name,), order) for order in _orders(count))
     if name == "rolling":
         return
     for degrees in (90, -90, 180):
@@ -148,21 +141,25 @@ def _whole_casters(recording: Recording) -> Iterator[Mend]:
     """Casters that are counted in another order, in all of their columns."""
     if recording.rolling is None:
         return
-    names = ("steering", "rolling")
-    count = recording.steering.shape[1]
-    ring = list(range(count))
+    ring = list(range(recording.steering.shape[1]))
     turns = [tuple(some[i:] + some[:i]) for some in (ring, ring[::-1]) for i in ring]
-    pairs = (order for order in _orders(count) if sum(i != j for i, j in enumerate(order)) == 2)
+    pairs = (order for order in _orders(len(ring)) if sum(i != j for i, j in enumerate(order)) == 2)
     for order in dict.fromkeys((*pairs, *turns)):  # the other way round, or from another caster on
-        moved = [(i, j) for i, j in enumerate(order) if i != j]
-        if not moved:
-            continue
-        yield Mend(
-            f"{listed(f'{name}_{i + 1}' for name in names for i, _ in moved)} are columns of other casters",
-            "call " + listed(f"{name}_{j + 1} {name}_{i + 1}" for name in names for i, j in moved) + _TORQUES_TOO,
-            lambda r, order=list(order): replace(r, **{name: getattr(r, name)[:, order] for name in names}),  # type: ignore[misc]
-            "steering",
-        )
+        if order != tuple(ring):
+            yield _reordered(("steering", "rolling"), order)
+
+
+def _reordered(names: tuple[str, ...], order: tuple[int, ...]) -> Mend:
+    """Columns that are those of other casters: the columns of caster i are called by the number order[i]."""
+    moved = [(i, j) for i, j in enumerate(order) if i != j]
+    columns = listed(f"{name}_{i + 1}" for name in names for i, _ in moved)
+    calls = listed(f"{name}_{j + 1} {name}_{i + 1}" for name in names for i, j in moved)
+    return Mend(
+        f"{columns} are columns of other casters",
+        f"call {calls}{_TORQUES_TOO}",
+        lambda r: r.change_columns(lambda name, own: own[:, list(order)] if name in names else own),
+        names[0],
+    )
 
 
 def _orders(count: int) -> Iterator[tuple[int, ...]]:
@@ -309,14 +306,11 @@ def _shifted(recording: Recording, name: str, rows: int) -> Recording:
     """Some columns `rows` later than they came, the ends left out."""
     count = len(recording.pose) - abs(rows)
     theirs, others = (slice(rows, None), slice(count)) if rows > 0 else (slice(count), slice(-rows, None))
-    cut = {
-        key: None if (array := getattr(recording, key)) is None else array[theirs if key == name else others]
-        for key in ("pose", "steering", "torque", "twist", "rolling")
-    }
-    if name in ("position", "heading"):
-        place, turn = (theirs, others) if name == "position" else (others, theirs)
-        cut["pose"] = np.column_stack([recording.pose[place, :2], recording.pose[turn, 2]])
-    return replace(recording, **cut)  # type: ignore[arg-type]
+    cut = recording.change_columns(lambda key, columns: columns[theirs if key == name else others])
+    if name not in ("position", "heading"):
+        return cut
+    place, turn = (theirs, others) if name == "position" else (others, theirs)
+    return replace(cut, pose=np.column_stack([recording.pose[place, :2], recording.pose[turn, 2]]))
 
 
 def _scaled(recording: Recording, name: str, factors: dict[int, float]) -> Recording:

@@ -14,6 +14,7 @@ Columns without a unit are in the one given here. docs/files.md tells which othe
 Other columns are left out, and times that jitter are made even; a TableNote tells of both.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,11 +25,13 @@ from caster_gym.arrays import Array
 from caster_gym.configuration import Frozen
 from caster_gym.engines.numpy_model import Model
 from caster_gym.engines.time_step import longest_time_step, substeps_for
-from caster_gym.identification.recording_table import FEWEST_ROWS, POSE, TWIST, read_measured
 from caster_gym.identification.rolling import rolled_along
 from caster_gym.mechanics.parameters import Dynamics
 from caster_gym.report.tables import write_csv
 from caster_gym.robot import Robot
+
+FEWEST_ROWS = 10
+POSE, TWIST = ("x", "y", "heading"), ("vx", "vy", "yaw_rate")
 
 
 class Noise(Frozen):
@@ -76,6 +79,12 @@ class Recording:
         parts = [self.pose, self.twist, self.steering, self.rolling]
         return np.concatenate([part for part in parts if part is not None], axis=1)
 
+    def change_columns(self, change: Callable[[str, Array], Array]) -> "Recording":
+        """The same recording with other columns: change gives new ones for each field's name and columns (K, n)."""
+        fields = {name: getattr(self, name) for name in ("pose", "steering", "torque", "twist", "rolling")}
+        given = {name: change(name, columns) for name, columns in fields.items() if columns is not None}
+        return replace(self, **given)  # type: ignore[arg-type]  # mypy does not follow names in a dict
+
     def without_twist(self) -> "Recording":
         """The same recording as a robot makes it that measures no velocities."""
         return replace(self, twist=None)
@@ -84,14 +93,9 @@ class Recording:
         """The same recording with errors added to all that is measured; torques stay."""
         levels = np.array([getattr(noise, kind) or 0.0 for kind in self.kinds])
         errors = levels * rng.standard_normal((len(self.pose), len(levels)))
-        pose, twist, steering, rolling = np.split(errors, [3, 6, 6 + self.steering.shape[1]], axis=1)
-        return replace(
-            self,
-            pose=self.pose + pose,
-            steering=self.steering + steering,
-            twist=None if self.twist is None else self.twist + twist,
-            rolling=None if self.rolling is None else self.rolling + rolling,
-        )
+        parts = np.split(errors, [3, 6, 6 + self.steering.shape[1]], axis=1)
+        added = dict(zip(("pose", "twist", "steering", "rolling"), parts, strict=True))
+        return self.change_columns(lambda name, columns: columns + added[name] if name in added else columns)
 
 
 def record(
@@ -173,9 +177,3 @@ def write_recording(path: str | Path, recording: Recording) -> None:
     rows = np.column_stack([time, recording.measured, recording.torque])
     heads = [f"{name} [{_unit(name)}]" for name in names]
     write_csv(Path(path).expanduser(), heads, ([f"{number:.10g}" for number in row] for row in rows))
-
-
-def read_recording(path: str | Path, robot: Robot) -> Recording:
-    """A recording of a robot from a file. Raises ValueError that names column, line and value of what is wrong."""
-    found = read_measured(Path(path).expanduser(), robot)
-    return Recording(found.time_step, found.pose, found.steering, found.torque, found.twist, found.rolling)

@@ -7,7 +7,6 @@ time (`caster_gym.identification.mends`), and the one that mends the recording i
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -44,12 +43,8 @@ def check_recording(
     """
     believed, values = robot_with(robot, starts or {}), starts or {}
     errors = shown_errors(robot, values, 6 + robot.caster_count)
-    as_true = replace(
-        recording,
-        pose=recording.pose - errors[:3],
-        twist=None if recording.twist is None else recording.twist - errors[3:6],
-        steering=recording.steering - errors[6:],
-    )
+    shown = {"pose": errors[:3], "twist": errors[3:6], "steering": errors[6:]}
+    as_true = recording.change_columns(lambda name, columns: columns - shown[name] if name in shown else columns)
     found = contradiction(as_true, believed)
     if found is None and not any("strength" in name for name in (*names, *values)):
         found = torques_too_large(recording, robot)
@@ -142,9 +137,7 @@ def _liveliest(recording: Recording, robot: Robot) -> Recording:
     sums = np.concatenate([[0.0], np.cumsum(steps)])
     first = int((sums[_MOST_ROWS - 1 :] - sums[: len(sums) - _MOST_ROWS + 1]).argmax())
     rows = slice(first, first + _MOST_ROWS)
-    twist, rolling = (None if one is None else one[rows] for one in (recording.twist, recording.rolling))
-    pose, steering, torque = (one[rows] for one in (recording.pose, recording.steering, recording.torque))
-    return Recording(recording.time_step, pose, steering, torque, twist, rolling)
+    return recording.change_columns(lambda _, columns: columns[rows])
 
 
 def _is_coarse(size: Size) -> bool:

@@ -1,12 +1,13 @@
 """From the table of a recording to what was measured, in SI units and at even times."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.configuration import did_you_mean
+from caster_gym.identification.recording import FEWEST_ROWS, TWIST, Recording
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import each, flatten, pairs
@@ -17,9 +18,6 @@ from caster_gym.table_files import read_table
 from caster_gym.tables import Quantity, Table, note, note_left_out
 from caster_gym.units import unlikely_radians
 
-FEWEST_ROWS = 10
-POSE = ("x", "y", "heading")
-TWIST = ("vx", "vy", "yaw_rate")
 MOST_JITTER = 0.5  # [-] of the time step, by which two samples may come too near or too far, and are made even
 _EVEN = 0.01  # [-] of the time step, by which they may without being changed
 
@@ -28,17 +26,6 @@ _TWIST = {
     "vy": Quantity("velocity", ("vy", "v_y", "vel_y", "velocity_y", "linear_y")),
     "yaw_rate": Quantity("rate", ("yaw_rate", "yawrate", "omega", "omega_z", "wz", "angular_z", "angular_velocity_z")),
 }
-
-
-class Measured(NamedTuple):
-    """What a recording holds, in SI units, at even times."""
-
-    time_step: float  # [s]
-    pose: Array  # (K, 3)
-    steering: Array  # (K, N)
-    torque: Array  # (K, 2 N) at the joints, held until the next sample
-    twist: Array | None  # (K, 3)
-    rolling: Array | None  # (K, N)
 
 
 def quantities_of(robot: Robot) -> dict[str, Quantity]:
@@ -56,8 +43,9 @@ def quantities_of(robot: Robot) -> dict[str, Quantity]:
     return {"time": TIME, **POINT, "heading": HEADING, **_TWIST, **steering, **rolling, **torques, **QUATERNION}
 
 
-def read_measured(path: Path, robot: Robot) -> Measured:
-    """What was measured. Raises ValueError that names column, line and value of what is wrong."""
+def read_recording(path: str | Path, robot: Robot) -> Recording:
+    """A recording of a robot from a file. Raises ValueError that names column, line and value of what is wrong."""
+    path = Path(path).expanduser()
     table = read_table(path).matched(quantities_of(robot))
     steering = [f"steering_{i}" for i in range(1, robot.caster_count + 1)]
     at = "torque" if all(f"torque_{joint}" in table.found for joint in robot.joints) else "motor"
@@ -82,8 +70,7 @@ def read_measured(path: Path, robot: Robot) -> Measured:
         given = np.stack(flatten(each(joint_torques, (), pairs(tuple(given.T)), casters)), axis=1)
     pose = np.column_stack([table.numbers(["x", "y"]), heading])
     optional = [table.numbers(names) if names else None for names in (twist, rolled)]
-    measured = Measured(0.0, pose, table.numbers(steering), given, *optional)
-    return _made_even(table, table.times()[0], measured)
+    return _made_even(table, table.times()[0], Recording(0.0, pose, table.numbers(steering), given, *optional))
 
 
 def _refuse_missing(table: Table, robot: Robot, needed: list[str]) -> None:
@@ -115,7 +102,7 @@ def _refuse_degrees(table: Table, name: str) -> None:
         )
 
 
-def _made_even(table: Table, times: Array, measured: Measured) -> Measured:
+def _made_even(table: Table, times: Array, measured: Recording) -> Recording:
     """The same at even times: as it is, or resampled if times jitter by less than MOST_JITTER of their step.
 
     Torques are held from sample to sample: their means over the new steps keep their impulse.
@@ -135,7 +122,7 @@ def _made_even(table: Table, times: Array, measured: Measured) -> Measured:
     step = float(times[-1]) / (len(times) - 1)
     even = step * np.arange(len(times))
     if np.abs(off).max() <= _EVEN or np.abs(times - even).max() <= 0.5 * _EVEN * step:
-        return measured._replace(time_step=step)
+        return replace(measured, time_step=step)
     note(
         f"{table.source}: the times between samples differ by up to {np.abs(off).max():.0%} from {usual:.4g} s; "
         f"the recording is resampled to even steps of {step:.4g} s"
@@ -149,7 +136,7 @@ def _made_even(table: Table, times: Array, measured: Measured) -> Measured:
         [np.zeros((1, measured.torque.shape[1])), np.cumsum(measured.torque[:-1] * steps[:, None], axis=0)]
     )
     held = np.stack([np.diff(np.interp(even, times, column)) / step for column in pushed.T], axis=1)
-    return Measured(
+    return Recording(
         step,
         moved(np.column_stack([measured.pose[:, :2], np.unwrap(measured.pose[:, 2])])),
         moved(np.unwrap(measured.steering, axis=0)),
