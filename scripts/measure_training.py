@@ -157,9 +157,9 @@ def empty_cache() -> Iterator[None]:
 
 def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
     """PPO on our robots and on free ones, with the same settings."""
-    ours = SB3VecEnv(training_batch(task, settings.robots))
+    ours = SB3VecEnv(training_batch(task, settings.n_envs))
     longest = round(float(np.mean(bare(ours.batch).engine.plan.guide.spans[:, 2])))
-    free, round_ = FreeVecEnv(ours, longest), settings.robots * settings.horizon
+    free, round_ = FreeVecEnv(ours, longest), settings.n_envs * settings.n_steps
     return [
         Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))
         for key, environment in ((OURS, ours), (FREE, free))
@@ -168,8 +168,8 @@ def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
 
 def beside_others(task: TaskSettings, settings: PPOSettings) -> Beside:
     """PPO on our robots with one thread and with two, beside busy processes."""
-    environment = SB3VecEnv(training_batch(task, settings.robots))
-    return train_beside(make_learner(settings, environment, seed=0), settings.robots * settings.horizon)
+    environment = SB3VecEnv(training_batch(task, settings.n_envs))
+    return train_beside(make_learner(settings, environment, seed=0), settings.n_envs * settings.n_steps)
 
 
 def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
@@ -190,7 +190,7 @@ def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
 def train_timed(name: str, task: TaskSettings, settings: LearnerSettings, seed: int) -> Course:
     """Train to the end of the settings, as in a process of its own: what Torch has compiled it gets from the disk."""
     torch.compiler.reset()
-    with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.steps, desc=f"{name}, seed {seed}") as bar:
+    with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.n_timesteps, desc=f"{name}, seed {seed}") as bar:
         timed = TimedRun(Path(folder), task, settings, seed, bar)
         settings.learn(timed)
         timed.logger.close()
@@ -223,7 +223,7 @@ def window_costs(task: TaskSettings, settings: SHACSettings) -> WindowCosts:
     forward, backward, critic = np.median(spent, axis=0).tolist()
     torch.compiler.reset()
     _, fetching = _first_window(task, settings)
-    periods = settings.robots * settings.window
+    periods = settings.n_envs * settings.n_steps
     return WindowCosts(periods, learner.task.task.substeps, forward, backward, critic, compiling, fetching)
 
 
@@ -239,8 +239,8 @@ def rate_on_tensors(task: TaskSettings, settings: LearnerSettings) -> float:
     """Control periods of training per second of the processor; the first round, which compiles, is not counted."""
     if not isinstance(settings, RslPPOSettings):
         raise ValueError(f"only PPO on tensors is measured without its error, got algorithm {settings.algorithm!r}")
-    round_ = settings.robots * settings.horizon
-    settings = settings.model_copy(update={"steps": (ROUNDS + 2) * round_, "validations": 1, "device": "cpu"})
+    round_ = settings.n_envs * settings.n_steps
+    settings = settings.model_copy(update={"n_timesteps": (ROUNDS + 2) * round_, "validations": 1, "device": "cpu"})
     starts: list[float] = []
     torch.compiler.reset()
     with tempfile.TemporaryDirectory() as folder:
@@ -276,7 +276,7 @@ def main(arguments: list[str] | None = None) -> None:
     task = read_settings(TaskSettings, "tasks", chosen.task)
     if task.environment != "track":
         raise ValueError(f"the goal is one of tracking, got a task of environment {task.environment!r}")
-    changes = {"validations": VALIDATIONS} | ({} if chosen.steps is None else {"steps": chosen.steps})
+    changes = {"validations": VALIDATIONS} | ({} if chosen.steps is None else {"n_timesteps": chosen.steps})
     agents = {name: read_learner(name, changes) for name in chosen.agents}
     on_tensors = {name: read_learner(name, {}) for name in chosen.tensors}
     ppo = read_learner("ppo", {})

@@ -272,7 +272,7 @@ def _limits(results: Results) -> str:
     for name, (settings, rate) in results.rates.items():
         parts.append(
             paragraph(
-                f"""On tensors and on the same core, `{name}` (rsl-rl-lib, with {settings.robots:,} robots whose step is
+                f"""On tensors and on the same core, `{name}` (rsl-rl-lib, with {settings.n_envs:,} robots whose step is
                 compiled) trains at {shown(rate)} {RATE}; it is meant for a GPU."""
             )
         )
@@ -281,7 +281,7 @@ def _limits(results: Results) -> str:
 
 def _origin(results: Results, occasion: Occasion, folder: str) -> str:
     """Command, machine, versions, and what counts."""
-    often = {name: f"every {max(1, one.steps // one.validations):,}" for name, one in results.agents.items()}
+    often = {name: f"every {max(1, one.n_timesteps // one.validations):,}" for name, one in results.agents.items()}
     told = " and ".join(f"{name} {every}" for name, every in often.items())
     lines = [
         f"- Command: `{occasion.command}`",

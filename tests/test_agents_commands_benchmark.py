@@ -1,6 +1,7 @@
 """agents.commands.benchmark: one command leaves everything behind, all agents drive the same, errors are told."""
 
 import csv
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -32,7 +33,15 @@ SEEDS = [2, 5]
 STARTS = 2
 PATHS = 3
 RANDOM = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3}
-PPO = {"algorithm": "ppo", "steps": 9999, "hidden": [8], "robots": 8, "horizon": 32, "batch": 64, "validations": 2}
+PPO = {
+    "algorithm": "ppo",
+    "n_timesteps": 9999,
+    "net_arch": [8],
+    "n_envs": 8,
+    "n_steps": 32,
+    "batch_size": 64,
+    "validations": 2,
+}
 FREQUENCIES = [1.0, 15.0]
 
 
@@ -74,7 +83,7 @@ def task(settings):
 def finished(settings, tmp_path_factory):
     """Folder and table of a small comparison: a controller and two seeds of a learned agent."""
     folder = tmp_path_factory.mktemp("benchmark")
-    return folder, run_benchmark(read_comparison(settings, {"steps": 512}), folder)
+    return folder, run_benchmark(read_comparison(settings, {"n_timesteps": 512}), folder)
 
 
 @pytest.mark.slow
@@ -103,7 +112,7 @@ def test_run_yaml_holds_what_the_comparison_was(finished, settings):
     assert BenchmarkSettings(**facts["benchmark"]) == settings
     assert {"versions", "command", "task", "robot"} <= set(facts)
     controller, learner = (Path(agent).stem for agent in settings.agents)
-    assert facts["agents"][learner]["steps"] == 512  # the change, not the file's
+    assert facts["agents"][learner]["n_timesteps"] == 512  # the change, not the file's
     assert facts["tuned"][controller]["natural_frequencies"] == [15.0]
 
 
@@ -179,7 +188,7 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
 def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
     """Here the folder of a run cannot be made, since a file is there."""
     (tmp_path / "taken").write_text("", encoding="utf-8")
-    agent = read_agent(settings.agents[1], {"steps": 512})
+    agent = read_agent(settings.agents[1], {"n_timesteps": 512})
     with pytest.raises(OSError, match="taken"):
         train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
 
@@ -197,7 +206,7 @@ def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, 
     monkeypatch.setattr(training, "ProcessPoolExecutor", Pool)
     monkeypatch.setattr(training, "usable_cores", lambda: 16)
     monkeypatch.setattr(training, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
-    agent = read_agent(settings.agents[1], {"steps": 512})
+    agent = read_agent(settings.agents[1], {"n_timesteps": 512})
     train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
     assert pools == [processes]
     assert submitted == 5 * [threads[0] if threads else 1]
@@ -241,7 +250,7 @@ def test_following_is_compared_in_the_same_way(tmp_path):
         seeds=(2,),
     )
     folder = tmp_path / "results"
-    text = run_benchmark(read_comparison(settings, {"steps": 512}), folder)
+    text = run_benchmark(read_comparison(settings, {"n_timesteps": 512}), folder)
     assert "time for the path [s]" in text
     assert (folder / "speeds.png").read_bytes().startswith(b"\x89PNG")
     controlled, learned = rows(folder / "episodes.csv")[::2]
@@ -270,3 +279,37 @@ def test_each_benchmark_that_comes_with_the_package_names_what_there_is(name):
     for kind in (ControllerSettings, LearnerSettings):
         assert any(isinstance(agent, kind) for agent in agents)
     assert len(set(settings.seeds)) == len(settings.seeds) >= 3
+
+
+def blocks(section, language):
+    """Code of a language in a section of CONTRIBUTING.md."""
+    text = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    return re.findall(
+        rf"```{language}\n(.*?)```", text.partition(f"## {section}\n")[2].partition("\n## ")[0], re.DOTALL
+    )
+
+
+def test_agents_of_ones_own_take_part_as_contributing_tells(tmp_path, settings, monkeypatch):
+    """The controller and the learner of that page, as they stand there, beside computed torque."""
+    monkeypatch.syspath_prepend(tmp_path / "elsewhere")  # restores sys.path afterwards
+    for section, module, agent in (("Add a controller", "springs", "spring"), ("Add a learner", "search", "search")):
+        (tmp_path / f"{module}.py").write_text(blocks(section, "python")[0], encoding="utf-8")
+        (tmp_path / f"{agent}.yaml").write_text(blocks(section, "yaml")[0], encoding="utf-8")
+    agents = (settings.agents[0], *(str(tmp_path / f"{agent}.yaml") for agent in ("spring", "search")))
+    folder = tmp_path / "results"
+    comparison = read_comparison(settings.model_copy(update={"agents": agents}), {"validations": 2})
+    text = run_benchmark(comparison, folder)
+    assert [name in text for name in ("computed torque", "spring", "Search, 2 seeds")] == [True] * 3
+    driven = {row["agent"]: row for row in rows(folder / "episodes.csv")}
+    assert driven["spring"]["failed"] == "0.0"
+    assert float(driven["spring"]["position_rmse"]) < 0.05  # [m] a spring without feed-forward lags behind
+    facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
+    assert facts["agents"]["spring"] == {"algorithm": "springs:Spring", "stiffness": 150.0, "damping": 20.0}
+    assert {name: one["module"] for name, one in facts["sources"].items()} == {
+        "controller": "caster_gym.agents.control.computed_torque",
+        "spring": "springs",
+        "search": "search",
+    }
+    assert all(facts["sources"][name]["version"].startswith("sha256:") for name in ("spring", "search"))
+    best = load_policy(folder / "policies" / "search-2" / "best").description
+    assert (best.name, best.hidden, best.squash) == ("Search", (8,), "tanh")

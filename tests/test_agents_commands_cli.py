@@ -86,19 +86,19 @@ def test_each_command_explains_itself(call, command):
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (
             ["train", "--set", "num_minibatches=4"],
-            "unknown key 'num_minibatches'; 'batch' is the size of a batch: robots · horizon over their number",
+            "unknown key 'num_minibatches'; 'batch_size' is the size of a batch: n_envs · n_steps over their number",
         ),
         (
             ["train", "--set", "train_batch_size=4000"],
-            "unknown key 'train_batch_size'; robots · horizon steps come before each update",
+            "unknown key 'train_batch_size'; n_envs · n_steps steps come before each update",
         ),
         (
             ["identify", "drive.csv", "--set", "start={radius:0.0265}"],
             "--set start={radius:0.0265}: a colon needs a space after it, as in 'radius: 0.0265'",
         ),
-        (["train", "--set", "stepz=3"], "did you mean 'steps'?"),
+        (["train", "--set", "stepz=3"], "did you mean 'n_steps'?"),
         (["train", "--set", "steps=many"], "should be a whole number, got 'many'"),
-        (["train", "--set", "steps=["], "--set steps=[ cannot be read as YAML: expected the node content"),
+        (["train", "--set", "steps=["], "--set n_timesteps=[ cannot be read as YAML: expected the node content"),
     ],
 )
 def test_mistakes_get_one_sentence(call, tmp_path, arguments, message):
@@ -110,7 +110,7 @@ def test_exponents_are_numbers(call, tmp_path):
     tiny = [*TINY[2:], "--set", "steps=1e2", "--set", "learning_rate=1e-3"]
     assert call("train", "ppo", *tiny, "--task", "task.yaml", "--out", "run").exit_code == 0
     agent = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text(encoding="utf-8"))["agent"]
-    assert (agent["steps"], agent["learning_rate"]) == (100, 0.001)
+    assert (agent["n_timesteps"], agent["learning_rate"]) == (100, 0.001)
 
 
 def test_a_folder_that_is_no_policy_is_refused(call, tmp_path):
@@ -281,7 +281,7 @@ def test_completion_is_offered(call):
             ["--set", "learning_rate=1e9"],
             "training has diverged after 64 steps, with a learning_rate of 1e+09; try a small",
         ),
-        (["--set", "n_steps=8"], "unknown key 'n_steps'; it is called 'horizon' here"),
+        (["--set", "horizon=8"], "unknown key 'horizon'; it is called 'n_steps' here"),
     ],
 )
 def test_a_start_that_fails_is_in_nobodys_way(call, tmp_path, wrong, message):
@@ -392,9 +392,9 @@ def test_mistakes_in_an_export_get_one_sentence(call, tmp_path, arguments, messa
         (["train", "--task", "track.yaml"], "what comes with the package is called 'track'"),
         (
             ["train", "sac", "--set", "steps=5000"],
-            "'first_random' must be below the steps in all, 5000, got 10000",
+            "'learning_starts' must be below n_timesteps, 5000, got 10000",
         ),
-        (["train", "--set", "hidden=[1e9]"], "number 1 of 'hidden' should be less than or equal to 16384"),
+        (["train", "--set", "hidden=[1e9]"], "number 1 of 'net_arch' should be less than or equal to 16384"),
         (["train", "--set", "robots=1e12"], "robots at most"),
         (["watch", "--seconds", "1e400", "--save", "a.gif"], "seconds must be positive and finite, got inf"),
         (

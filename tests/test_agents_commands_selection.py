@@ -3,10 +3,18 @@
 import pytest
 import yaml
 
-from caster_gym.agents.commands.selection import choose_task
+from caster_gym.agents.commands.selection import choose_agent, choose_task
+from caster_gym.agents.comparison.evaluation import test_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.learning.bundle import DESCRIPTION
+from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.bundle import DESCRIPTION, Bundle, PolicyDescription, save_bundle
+from caster_gym.configuration import ConfigurationError
+from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.track_task import TrackTask
+from caster_gym.robot import load_robot
 from caster_gym.shipped_files import names_of, read_settings
+
+test_batch.__test__ = False  # a name that pytest would take for a test
 
 
 def shipped(name):
@@ -54,3 +62,70 @@ def test_without_a_record_the_usual_task_is_taken_and_said_to_be(tmp_path):
     assert f"Task track, since no run.yaml above {policy} tells" in found.words
     assert choose_task("computed_torque", None).words == "Task track."
     assert choose_task("computed_torque", "follow").settings == shipped("follow")
+
+
+BUNDLE_CODE = "from pathlib import Path\nPath(__file__).with_suffix('.ran').touch()\n"
+
+
+@pytest.fixture
+def stranger(tmp_path, monkeypatch):
+    """A policy in its run, with a module beside each of its files; some file of it names the module."""
+    policy = run_of(tmp_path, shipped("track"))
+    layout = ObservationLayout(load_robot("chung2008"), TrackTask().preview)
+    description = PolicyDescription(
+        format=1,
+        name="stranger:Policy",
+        squash="clip",
+        hidden=(4,),
+        robot=layout.robot,
+        task=TrackTask(),
+        trained_with={"settings": {"algorithm": "stranger:Learner"}},
+        versions={},
+    )
+    save_bundle(policy, Bundle(description, Actor(layout.size, (4,), 6, "clip")))
+    for folder in (policy, tmp_path):
+        (folder / "stranger.py").write_text(BUNDLE_CODE, encoding="utf-8")
+    monkeypatch.chdir(policy)
+    return policy
+
+
+def changed(file, **changes):
+    content = {**yaml.safe_load(file.read_text(encoding="utf-8")), **changes}
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+
+
+def try_policy(policy):
+    settings = choose_task(str(policy), None).settings
+    return choose_agent(str(policy), settings, test_batch(settings, settings.test[:1], 1)).agent
+
+
+def test_a_policy_is_evaluated_without_a_look_at_its_code(stranger):
+    """Settings of the learner are a record: nothing is imported for them."""
+    changed(stranger.parent / "run.yaml", agent={"algorithm": "stranger:Learner"}, source={"module": "stranger"})
+    assert try_policy(stranger).name == "stranger:Policy"
+    assert not list(stranger.parent.rglob("*.ran"))
+
+
+@pytest.mark.parametrize("file", ["run.yaml", "best/policy.yaml"])
+@pytest.mark.parametrize("key", ["environment", "robot", "wrappers", "task", "arena", "algorithm"])
+def test_no_file_of_a_policy_brings_code(stranger, file, key):
+    named = ["stranger:Thing"] if key == "wrappers" else "stranger:Thing"
+    place = stranger.parent / file
+    if file == "run.yaml":
+        changed(place, task={**yaml.safe_load(place.read_text(encoding="utf-8"))["task"], key: named})
+    else:
+        changed(place, **{key: named})
+    with pytest.raises(ConfigurationError):
+        try_policy(stranger)
+    assert not list(stranger.parent.rglob("*.ran"))
+
+
+@pytest.mark.parametrize("file", ["run.yaml", "best/policy.yaml", "best/agent.yaml"])
+def test_no_file_beside_a_policy_is_an_agent_with_code(stranger, file):
+    place = stranger.parent / file
+    place.touch()
+    place.write_text("algorithm: stranger:Thing", encoding="utf-8")
+    settings = shipped("track")
+    with pytest.raises(ConfigurationError):
+        choose_agent(str(place), settings, test_batch(settings, settings.test[:1], 1))
+    assert not list(stranger.parent.rglob("*.ran"))

@@ -102,8 +102,8 @@ def test_actions_stay_within_their_bounds(squash):
 @pytest.mark.parametrize(
     "settings",
     [
-        PPOSettings(algorithm="ppo", hidden=HIDDEN, robots=4, horizon=8, batch=32),
-        SACSettings(algorithm="sac", hidden=HIDDEN, robots=4, buffer=100),
+        PPOSettings(algorithm="ppo", net_arch=HIDDEN, n_envs=4, n_steps=8, batch_size=32),
+        SACSettings(algorithm="sac", net_arch=HIDDEN, n_envs=4, buffer_size=100),
     ],
     ids=["ppo", "sac"],
 )
@@ -128,7 +128,7 @@ def test_the_actor_is_the_deterministic_policy_of_sb3(settings):
 
 def test_the_actor_keeps_weights_of_its_own():
     """Later training does not change a policy that was kept."""
-    settings = PPOSettings(algorithm="ppo", hidden=HIDDEN, robots=4, horizon=8, batch=32)
+    settings = PPOSettings(algorithm="ppo", net_arch=HIDDEN, n_envs=4, n_steps=8, batch_size=32)
     batch = CasterTrackVectorEnv(4, path="circle", autoreset_mode="SameStep", corridor=TASK.corridor)
     learner = make_learner(settings, SB3VecEnv(batch), seed=1)
     actor = actor_of(learner, settings)

@@ -22,7 +22,7 @@ from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 SEED, COUNT, LONGEST = 5, 3, 3
 QUICK = {"control_period": 0.01, "substeps": 1}  # one RK4 step a period: Torch alone, uncompiled, is slow
 SETTINGS = RslPPOSettings(
-    algorithm="rsl_ppo", steps=24, robots=COUNT, horizon=4, batch=6, epochs=2, hidden=(8,), validations=2
+    algorithm="rsl_ppo", n_timesteps=24, n_envs=COUNT, n_steps=4, batch_size=6, n_epochs=2, net_arch=(8,), validations=2
 )
 PATH = {"shape": "random_paths", "duration": 2.5, "max_speed": 0.3, "count": 2}
 TASK = {kind: [{**PATH, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
@@ -135,12 +135,14 @@ def test_a_device_that_is_not_there_is_named(tmp_path):
 
 
 def test_batches_must_be_whole():
-    fields = {"algorithm": "rsl_ppo", "robots": 4, "horizon": 8}
-    parse(RslPPOSettings, {**fields, "batch": 16}, "agent")
-    with pytest.raises(ConfigurationError, match=r"'batch' must divide robots · horizon = 32 steps, got 12: .* is 8$"):
-        parse(RslPPOSettings, {**fields, "batch": 12}, "agent")
-    with pytest.raises(ConfigurationError, match=r"'batch' must be at most robots · horizon = 32 steps, got 33"):
-        parse(RslPPOSettings, {**fields, "batch": 33}, "agent")
+    fields = {"algorithm": "rsl_ppo", "n_envs": 4, "n_steps": 8}
+    parse(RslPPOSettings, {**fields, "batch_size": 16}, "agent")
+    with pytest.raises(
+        ConfigurationError, match=r"'batch_size' must divide n_envs · n_steps = 32 steps, got 12: .* is 8$"
+    ):
+        parse(RslPPOSettings, {**fields, "batch_size": 12}, "agent")
+    with pytest.raises(ConfigurationError, match=r"'batch_size' must be at most n_envs · n_steps = 32 steps, got 33"):
+        parse(RslPPOSettings, {**fields, "batch_size": 33}, "agent")
 
 
 def test_the_settings_for_a_gpu_are_meant_for_one():

@@ -28,10 +28,10 @@ TASK = parse(
 )
 FIELDS = {
     "algorithm": "shac",
-    "robots": 4,
-    "window": 3,
-    "critic_batch": 6,
-    "hidden": (16,),
+    "n_envs": 4,
+    "n_steps": 3,
+    "batch_size": 6,
+    "net_arch": (16,),
     "restarts": 0.0,
     "compile": False,  # which would take longer than all tests together
 }
@@ -107,7 +107,7 @@ def test_no_gradient_enters_a_window():
 
 def test_some_robots_start_anew_before_a_window():
     """Those that do are at rest in their next episode; for all others nothing has changed."""
-    learning = learner(robots=64, critic_batch=192, restarts=0.25)
+    learning = learner(n_envs=64, batch_size=192, restarts=0.25)
     learning.gain()
     before, seen = learning.state, learning.outcome.observations
     learning.start_some_anew()
@@ -163,7 +163,7 @@ def test_policies_get_better():
     )
     coarse = {"control_period": 0.04, "substeps": 1, "preview": (0.08, 0.2, 0.4)}
     task = TorchTask("track", robot, path=[{**PATH, "seed": 0}], fields=coarse)
-    changes = {"robots": 16, "window": 12, "critic_batch": 192, "critic_learning_rate": 1e-12, "learning_rate": 1e-2}
+    changes = {"n_envs": 16, "n_steps": 12, "batch_size": 192, "critic_learning_rate": 1e-12, "learning_rate": 1e-2}
     learning = ShortHorizon(task, parse(SHACSettings, {**FIELDS, **changes}, "agent"), seed=0)
     for parameter in (*learning.critic.parameters(), *learning.target.parameters()):
         parameter.data.zero_()
@@ -196,7 +196,7 @@ def test_the_rate_falls_and_the_last_window_hardly_learns():
 
 
 def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
-    settings = parse(SHACSettings, {**FIELDS, "steps": 24, "validations": 2}, "agent")
+    settings = parse(SHACSettings, {**FIELDS, "n_timesteps": 24, "validations": 2}, "agent")
     for name in ("first", "again"):
         best = train(TASK, settings, 3, tmp_path / name, lambda steps, verdict: None, threads=1)
     facts = yaml.safe_load((tmp_path / "first" / "run.yaml").read_text(encoding="utf-8"))
@@ -212,11 +212,11 @@ def test_a_run_leaves_a_policy_that_evaluates_alike_after_loading(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"critic_batch": 13}, "'critic_batch' must be at most robots · window = 12 steps, got 13"),
-        ({"window": 0}, "'window' should be greater than 0, got 0"),
+        ({"batch_size": 13}, "'batch_size' must be at most n_envs · n_steps = 12 steps, got 13"),
+        ({"n_steps": 0}, "'n_steps' should be greater than 0, got 0"),
         ({"noise": -0.1}, "'noise' should be .*-0.1"),
         ({"restarts": 1.5}, "'restarts' should be .*1.5"),
-        ({"horizon": 16}, "unknown key 'horizon'"),
+        ({"horizon": 16}, "unknown key 'horizon'; it is called 'n_steps' here"),
     ],
 )
 def test_what_is_wrong_with_the_settings_is_named(content, message):

@@ -26,12 +26,12 @@ from caster_gym.shipped_files import read_settings
 from caster_gym.tasks.track.metrics import TrackVerdict, measure
 
 HELD_OUT_SEED = 7
-TINY = {"hidden": (8,), "robots": 8, "batch": 64, "validations": 2}
-PPO = PPOSettings(algorithm="ppo", steps=2048, horizon=64, epochs=2, **TINY)
-SAC = SACSettings(algorithm="sac", steps=1600, updates=1, buffer=2000, first_random=200, **TINY)
-TENSORS = {"hidden": (8,), "robots": 4, "compile": False, "device": "cpu"}
-RSL_PPO = RslPPOSettings(algorithm="rsl_ppo", steps=32, horizon=4, batch=16, validations=2, **TENSORS)
-SHAC = SHACSettings(algorithm="shac", steps=24, window=2, critic_batch=8, validations=3, **TENSORS)
+TINY = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2}
+PPO = PPOSettings(algorithm="ppo", n_timesteps=2048, n_steps=64, n_epochs=2, **TINY)
+SAC = SACSettings(algorithm="sac", n_timesteps=1600, gradient_steps=1, buffer_size=2000, learning_starts=200, **TINY)
+TENSORS = {"net_arch": (8,), "n_envs": 4, "compile": False, "device": "cpu"}
+RSL_PPO = RslPPOSettings(algorithm="rsl_ppo", n_timesteps=32, n_steps=4, batch_size=16, validations=2, **TENSORS)
+SHAC = SHACSettings(algorithm="shac", n_timesteps=24, n_steps=2, batch_size=8, validations=3, **TENSORS)
 LEARNERS = {"ppo": PPO, "sac": SAC, "rsl_ppo": RSL_PPO, "shac": SHAC}
 TASK = parse(
     TaskSettings,
@@ -108,7 +108,7 @@ def test_a_run_leaves_everything_behind(finished, name):
     steps = [int(row["steps"]) for row in history]
     assert steps == sorted(set(steps))
     assert len(steps) == settings.validations
-    assert settings.steps <= steps[-1] < settings.steps + 8 * 64
+    assert settings.n_timesteps <= steps[-1] < settings.n_timesteps + 8 * 64
     assert sorted(one.name for one in (folder / "checkpoints").iterdir()) == [f"{step:010d}" for step in steps]
     merits = [(int(row["failures"]), float(row["position_rmse"])) for row in history]
     assert (best.verdict.failures, best.verdict.position_rmse) == min(merits)
@@ -197,7 +197,7 @@ def test_training_takes_as_many_threads_as_are_asked_for(tmp_path, name):
 
 def test_an_interruption_keeps_what_was_learned(tmp_path):
     def interrupt(steps, verdict):
-        if steps >= PPO.steps // 4:
+        if steps >= PPO.n_timesteps // 4:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -205,7 +205,7 @@ def test_an_interruption_keeps_what_was_learned(tmp_path):
     facts = yaml.safe_load((tmp_path / "run.yaml").read_text(encoding="utf-8"))
     assert facts["completed"] is False
     bundle = load_policy(tmp_path / "best")
-    assert PPO.steps // 4 <= bundle.description.trained_with["steps"] < PPO.steps
+    assert PPO.n_timesteps // 4 <= bundle.description.trained_with["steps"] < PPO.n_timesteps
     assert [int(row["steps"]) for row in rows(tmp_path / "validation.csv")] == [
         bundle.description.trained_with["steps"]
     ]
@@ -220,7 +220,7 @@ def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     39 to 61 mm with up to 2 failures, and an untrained policy leaves the corridor on every path.
     """
     task = read_settings(TaskSettings, "tasks", "track")
-    settings = read_agent("ppo", {"steps": 600_000, "validations": 3})
+    settings = read_agent("ppo", {"n_timesteps": 600_000, "validations": 3})
     train(task, settings, 0, tmp_path, nothing)
     batch = evaluation.test_batch(task, task.test, starts=1)
     episodes = roll_out(load_policy(tmp_path / "best").agent, batch, HELD_OUT_SEED)

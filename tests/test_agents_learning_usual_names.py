@@ -60,7 +60,7 @@ def test_renamed_settings_of_learners_are_accepted_as_advised(agent):
     """The value that was given under the usual name is taken under the one that the message names."""
     values = read_agent(agent).model_dump()
     renamed = {usual: here for usual, here in kind(agent).usual_names.items() if here in values}
-    assert {"total_timesteps", "n_envs", "num_envs", "gamma", "lr", "net_arch"} <= renamed.keys()
+    assert {"total_timesteps", "steps", "robots", "num_envs", "discount", "lr", "hidden"} <= renamed.keys()
     for usual, here in renamed.items():
         said = refusal(lambda content: read_agent(agent, content), {usual: values[here]})
         assert said.endswith(f"unknown key {usual!r}; it is called {here!r} here")
@@ -70,23 +70,26 @@ def test_renamed_settings_of_learners_are_accepted_as_advised(agent):
 @pytest.mark.parametrize(
     ("agent", "usual", "here"),
     [
-        ("ppo", "n_steps", "horizon"),
-        ("ppo", "batch_size", "batch"),
-        ("ppo", "n_epochs", "epochs"),
-        ("ppo", "gae_lambda", "trace"),
-        ("ppo", "clip_range", "clip"),
-        ("ppo", "ent_coef", "entropy"),
-        ("ppo_gpu", "num_steps_per_env", "horizon"),
-        ("sac", "buffer_size", "buffer"),
-        ("sac", "learning_starts", "first_random"),
-        ("sac", "tau", "soft_update"),
-        ("sac", "gradient_steps", "updates"),
-        ("shac", "max_grad_norm", "greatest_gradient"),
-        ("shac", "n_steps", "window"),
+        ("ppo", "steps", "n_timesteps"),
+        ("ppo", "horizon", "n_steps"),
+        ("ppo", "batch", "batch_size"),
+        ("ppo", "epochs", "n_epochs"),
+        ("ppo", "trace", "gae_lambda"),
+        ("ppo", "clip", "clip_range"),
+        ("ppo", "entropy", "ent_coef"),
+        ("ppo", "initial_log_std", "log_std_init"),
+        ("ppo_gpu", "num_steps_per_env", "n_steps"),
+        ("sac", "buffer", "buffer_size"),
+        ("sac", "first_random", "learning_starts"),
+        ("sac", "soft_update", "tau"),
+        ("sac", "updates", "gradient_steps"),
+        ("shac", "greatest_gradient", "max_grad_norm"),
+        ("shac", "window", "n_steps"),
+        ("shac", "critic_batch", "batch_size"),
     ],
 )
 def test_what_the_usual_names_mean(agent, usual, here):
-    """As sb3_learning and rsl_rl hand them over: SB3's n_steps is the horizon, not the steps in all."""
+    """Older files and rsl-rl-lib say so; SB3's n_steps is what lies between updates, not the steps in all."""
     assert kind(agent).usual_names[usual] == here
 
 
@@ -94,6 +97,20 @@ def test_what_the_usual_names_mean(agent, usual, here):
 def test_every_parameter_of_stable_baselines_has_an_answer(agent, theirs):
     names = set(inspect.signature(theirs.__init__).parameters) - INTERNAL
     assert names <= kind(agent).usual_names.keys() | kind(agent).model_fields.keys()
+
+
+SB3_NAMES = {
+    "ppo": {"n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "clip_range", "ent_coef", "learning_rate"},
+    "sac": {"buffer_size", "train_freq", "gradient_steps", "tau", "learning_starts", "batch_size", "gamma", "ent_coef"},
+}
+
+
+@pytest.mark.parametrize(("agent", "theirs"), [("ppo", stable_baselines3.PPO), ("sac", stable_baselines3.SAC)])
+def test_settings_bear_the_names_of_stable_baselines(agent, theirs):
+    """n_envs and n_timesteps are rl_zoo3's, net_arch that of SB3's policies."""
+    ours = kind(agent).model_fields.keys()
+    assert SB3_NAMES[agent] | {"learning_rate", "n_envs", "n_timesteps", "net_arch"} <= ours
+    assert SB3_NAMES[agent] <= inspect.signature(theirs.__init__).parameters.keys()
 
 
 def test_answers_name_fields_and_options_that_exist():
@@ -111,7 +128,7 @@ def test_answers_name_fields_and_options_that_exist():
     ):
         known = {*model.model_fields, *TaskSettings.model_fields, *BenchmarkSettings.model_fields, *Floor.model_fields}
         known |= {*Robot.model_fields, "floor"}
-        known |= {"duration", "laps", "seed", "device", "path", "robots"}  # of paths, agents and environments
+        known |= {"duration", "laps", "seed", "device", "path", "n_envs"}  # of paths, agents and environments
         for answer in model.usual_names.values():
             assert set(re.findall(r"'(\w+)'", answer)) <= known, answer
             assert set(re.findall(r"(--\w+)", answer)) <= OPTIONS, answer
@@ -184,7 +201,7 @@ def test_keys_of_a_task_are_sent_where_they_belong():
 def test_settings_of_learners_are_sent_away_from_comparisons():
     said = refusal(lambda content: parse(BenchmarkSettings, content, "comparison"), {**AGENTS, "steps": 1000})
     assert said.endswith(
-        "unknown key 'steps'; it belongs to the agents: write steps into their files, or give --set steps=…"
+        "unknown key 'steps'; it belongs to the agents: write n_timesteps into their files, or give --set n_timesteps=…"
     )
     said = refusal(lambda content: parse(BenchmarkSettings, content, "comparison"), {**AGENTS, **PATHS})
     assert "it is a key of a task, whose name or file is given as 'task'" in said

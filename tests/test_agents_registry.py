@@ -34,16 +34,16 @@ def test_the_kinds_of_agents_are_told_by_their_algorithm():
 
 @pytest.mark.parametrize("number", ["1e-3", "1E-3", "0.001", ".001"])
 def test_exponents_are_numbers(tmp_path, number):
-    settings = read_agent(written(tmp_path, f"algorithm: ppo\nlearning_rate: {number}\nsteps: 1e6\n"))
-    assert (settings.learning_rate, settings.steps) == (1e-3, 1_000_000)
-    assert isinstance(settings.steps, int)
+    settings = read_agent(written(tmp_path, f"algorithm: ppo\nlearning_rate: {number}\nn_timesteps: 1e6\n"))
+    assert (settings.learning_rate, settings.n_timesteps) == (1e-3, 1_000_000)
+    assert isinstance(settings.n_timesteps, int)
 
 
 def test_changes_replace_what_the_file_says(tmp_path):
-    name = written(tmp_path, {"algorithm": "ppo", "steps": 5000, "robots": 8, "batch": 64})
-    changed = read_agent(name, {"steps": 700})
-    assert (changed.steps, changed.robots, changed.batch) == (700, 8, 64)
-    with pytest.raises(ConfigurationError, match=r"unknown key .*stepz.*; did you mean 'steps'\?"):
+    name = written(tmp_path, {"algorithm": "ppo", "n_timesteps": 5000, "n_envs": 8, "batch_size": 64})
+    changed = read_agent(name, {"n_timesteps": 700})
+    assert (changed.n_timesteps, changed.n_envs, changed.batch_size) == (700, 8, 64)
+    with pytest.raises(ConfigurationError, match=r"unknown key .*stepz.*; did you mean 'n_steps'\?"):
         read_agent(name, {"stepz": 700})
 
 
@@ -51,16 +51,16 @@ def test_changes_replace_what_the_file_says(tmp_path):
     ("content", "message"),
     [
         ({"algorithm": "ppo", "learning_rat": 1e-3}, r"unknown key .*learning_rat'; did you mean 'learning_rate'\?"),
-        ({"algorithm": "ppo", "buffer": 10}, "unknown key .*buffer"),  # a key of SAC
+        ({"algorithm": "ppo", "buffer_size": 10}, "unknown key .*buffer"),  # a key of SAC
         ({"algorithm": "computed torque", "known": "half"}, "known.*'half'"),
         ({"algorithm": "pppo"}, r"unknown algorithm 'pppo'; did you mean 'ppo'\?"),
-        ({"steps": 10}, "algorithm"),
-        ({"algorithm": "ppo", "steps": 0}, "steps.* greater than 0, got 0"),
-        ({"algorithm": "ppo", "steps": "many"}, "steps.* should be a whole number, got 'many'"),
-        ({"algorithm": "ppo", "discount": 1.0}, "discount.* less than 1, got 1.0"),
-        ({"algorithm": "sac", "soft_update": 0.0}, "soft_update.* greater than 0"),
-        ({"algorithm": "ppo", "hidden": []}, "hidden.* at least 1 item"),
-        ({"algorithm": "ppo", "falling": 1}, "falling.* true or false, got 1"),
+        ({"n_timesteps": 10}, "algorithm"),
+        ({"algorithm": "ppo", "n_timesteps": 0}, "steps.* greater than 0, got 0"),
+        ({"algorithm": "ppo", "n_timesteps": "many"}, "steps.* should be a whole number, got 'many'"),
+        ({"algorithm": "ppo", "gamma": 1.0}, "gamma.* less than 1, got 1.0"),
+        ({"algorithm": "sac", "tau": 0.0}, "tau.* greater than 0"),
+        ({"algorithm": "ppo", "net_arch": []}, "net_arch.* at least 1 item"),
+        ({"algorithm": "shac", "compile": 1}, "compile.* true or false, got 1"),
         ({"algorithm": "computed torque", "natural_frequencies": [10.0, -1.0]}, "natural_frequencies.*-1.0"),
     ],
 )

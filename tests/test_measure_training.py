@@ -66,7 +66,7 @@ def test_episodes_of_free_robots_end_by_time():
 
 def test_speeds_are_measured():
     """A smoke test."""
-    settings = read_learner("ppo", {}).model_copy(update={"robots": 2, "horizon": 8, "batch": 8, "hidden": (4,)})
+    settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
     rows = share_rows(TASK, settings)
     assert [row.key for row in rows] == [OURS, FREE]
     assert all(row.measure() > 0.0 for row in rows)
@@ -81,7 +81,7 @@ def test_training_is_measured_in_pairs_beside_busy_processes(monkeypatch):
     started = []
     popen = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *one, **more: started.append(popen(*one, **more)) or started[-1])
-    settings = read_learner("ppo", {}).model_copy(update={"robots": 2, "horizon": 8, "batch": 8, "hidden": (4,)})
+    settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
     environment = SB3VecEnv(training_batch(TASK, 2))
     beside = train_beside(make_learner(settings, environment, seed=0), periods=16, pairs=2)
     assert sorted(one.threads for one in beside.rounds) == [1, 1, 2, 2]
@@ -182,7 +182,7 @@ def test_time_of_validations_is_left_out(monkeypatch):
 
     monkeypatch.setattr(measure_training.Run, "validate", slow_validation)
     settings = read_learner(
-        "ppo", {"robots": 2, "horizon": 8, "batch": 8, "hidden": [4], "steps": 48, "validations": 3}
+        "ppo", {"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": [4], "n_timesteps": 48, "validations": 3}
     )
     course = train_timed("ppo", TASK, settings, 1)
     assert [(one.steps, one.seconds) for one in course.points] == [(16, 0.0), (32, 0.0), (48, 0.0)]
@@ -192,11 +192,11 @@ def test_time_of_validations_is_left_out(monkeypatch):
 def test_learners_on_tensors_are_measured(monkeypatch):
     """A smoke test, uncompiled."""
     monkeypatch.setattr(measure_training, "WINDOWS", 1)
-    fields = {"compile": False, "robots": 2, "hidden": [4]}
-    costs = window_costs(TASK, read_learner("shac", {**fields, "window": 2, "critic_batch": 4}))
+    fields = {"compile": False, "n_envs": 2, "net_arch": [4]}
+    costs = window_costs(TASK, read_learner("shac", {**fields, "n_steps": 2, "batch_size": 4}))
     assert (costs.periods, costs.substeps) == (4, 2)
     assert min(costs[2:]) > 0.0
-    ppo = read_learner("ppo_gpu", {**fields, "horizon": 2, "batch": 4})
+    ppo = read_learner("ppo_gpu", {**fields, "n_steps": 2, "batch_size": 4})
     assert rate_on_tensors(TASK, ppo) > 0.0
     with pytest.raises(ValueError, match=r"only PPO on tensors .* got algorithm 'ppo'"):
         rate_on_tensors(TASK, read_learner("ppo", {}))

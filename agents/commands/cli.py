@@ -72,11 +72,16 @@ def train(
             raise ValueError(f"agent {agent!r} does not learn; try it with `caster-gym evaluate {agent}`")
         tasks = read_settings(TaskSettings, "tasks", task)
         kept = files_among(agent, task, tasks.robot)
-        bar = {"total": settings.steps, "desc": f"{Path(agent).stem} seed {seed}", "unit": "step", "unit_scale": True}
+        bar = {
+            "total": settings.n_timesteps,
+            "desc": f"{Path(agent).stem} seed {seed}",
+            "unit": "step",
+            "unit_scale": True,
+        }
         with begun(out, overwrite, "best/policy.yaml", kept), progress(**bar) as show:
 
             def report(steps: int, verdict: str) -> None:
-                show(min(steps, settings.steps), verdict)
+                show(min(steps, settings.n_timesteps), verdict)
 
             best = run(tasks, settings, seed, out, report, threads)
         typer.echo(

@@ -20,7 +20,7 @@ Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empt
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Change a setting of the learned agents, e.g. --set steps=100000. May be repeated."),
+    typer.Option("--set", help="Change a setting of the learned agents, as --set n_timesteps=100000. May be repeated."),
 ]
 TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
 TrainedTask = Annotated[

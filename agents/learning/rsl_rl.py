@@ -10,7 +10,7 @@ from gymnasium.error import DependencyNotInstalled
 from torch import Tensor
 
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.settings import RslPPOSettings
+from caster_gym.agents.learning.settings import RslPPOSettings, scheduled
 from caster_gym.agents.learning.tensors import torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
@@ -64,28 +64,28 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
 def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> OnPolicyRunner:
     """rsl-rl-lib's PPO with our settings, its networks begun as Stable-Baselines3 begins them."""
     torch.manual_seed(seed)
-    network = {"class_name": "MLPModel", "hidden_dims": list(settings.hidden), "activation": "relu"}
+    network = {"class_name": "MLPModel", "hidden_dims": list(settings.net_arch), "activation": "relu"}
     spread = {
         "class_name": "GaussianDistribution",
-        "init_std": math.exp(settings.initial_log_std),
+        "init_std": math.exp(settings.log_std_init),
         "std_type": "log",
     }
     configuration = {
-        "num_steps_per_env": settings.horizon,
+        "num_steps_per_env": settings.n_steps,
         "check_for_nan": False,  # the robots' step never returns any, and to look would wait for the device
         "obs_groups": {"actor": [GROUP], "critic": [GROUP]},
         "actor": {**network, "distribution_cfg": spread},
         "critic": network,
         "algorithm": {
             "class_name": "PPO",
-            "num_learning_epochs": settings.epochs,
-            "num_mini_batches": settings.robots * settings.horizon // settings.batch,
-            "clip_param": settings.clip,
-            "gamma": settings.discount,
-            "lam": settings.trace,
+            "num_learning_epochs": settings.n_epochs,
+            "num_mini_batches": settings.n_envs * settings.n_steps // settings.batch_size,
+            "clip_param": settings.clip_range,
+            "gamma": settings.gamma,
+            "lam": settings.gae_lambda,
             "value_loss_coef": CRITIC_WEIGHT,
-            "entropy_coef": settings.entropy,
-            "learning_rate": settings.learning_rate,
+            "entropy_coef": settings.ent_coef,
+            "learning_rate": scheduled(settings.learning_rate, 1.0),
             "max_grad_norm": GREATEST_GRADIENT,
             "use_clipped_value_loss": False,
             "schedule": "fixed",
@@ -103,7 +103,7 @@ def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> 
 def actor_of(runner: OnPolicyRunner, settings: RslPPOSettings) -> Actor:
     """The deterministic part of the policy, with a copy of its weights on the CPU."""
     linear = [layer for layer in runner.alg.get_policy().mlp if isinstance(layer, torch.nn.Linear)]
-    actor = Actor(linear[0].in_features, settings.hidden, linear[-1].out_features, "clip")
+    actor = Actor(linear[0].in_features, settings.net_arch, linear[-1].out_features, "clip")
     for ours, theirs in zip([*actor.layers, actor.head], linear, strict=True):
         ours.load_state_dict({name: tensor.detach().cpu().clone() for name, tensor in theirs.state_dict().items()})
     return actor
@@ -114,7 +114,7 @@ def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
     environment = RslVecEnv(
         TorchVectorEnv(
             run.task.environment,
-            settings.robots,
+            settings.n_envs,
             device=settings.device,
             compile=settings.compile,
             **torch_fields(run.task),
@@ -123,11 +123,11 @@ def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
         run.seed,
     )
     runner = make_runner(settings, environment, run.seed)
-    steps, round_ = 0, settings.robots * settings.horizon
+    steps, round_ = 0, settings.n_envs * settings.n_steps
     try:
-        while steps < settings.steps:
+        while steps < settings.n_timesteps:
             run.advance(steps, lambda: actor_of(runner, settings))
-            rate = settings.learning_rate * (1.0 - steps / settings.steps if settings.falling else 1.0)
+            rate = scheduled(settings.learning_rate, 1.0 - steps / settings.n_timesteps)
             runner.alg.learning_rate = rate
             for group in runner.alg.optimizer.param_groups:
                 group["lr"] = rate

@@ -10,28 +10,28 @@ from stable_baselines3.common.callbacks import BaseCallback
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
-from caster_gym.agents.learning.settings import PPOSettings, SACSettings
+from caster_gym.agents.learning.settings import LinearSchedule, PPOSettings, SACSettings
 from caster_gym.agents.learning.training_run import Run
 
 
 def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, seed: int) -> BaseAlgorithm:
     """A fresh SB3 algorithm."""
     rate = settings.learning_rate
-    schedule = (lambda remaining: rate * max(remaining, 0.0)) if settings.falling else rate
-    policy: dict[str, Any] = {"net_arch": list(settings.hidden), "activation_fn": torch.nn.ReLU}
+    schedule = rate.at if isinstance(rate, LinearSchedule) else rate
+    policy: dict[str, Any] = {"net_arch": list(settings.net_arch), "activation_fn": torch.nn.ReLU}
     if isinstance(settings, PPOSettings):
         return PPO(
             "MlpPolicy",
             environment,
             learning_rate=schedule,
-            n_steps=settings.horizon,
-            batch_size=settings.batch,
-            n_epochs=settings.epochs,
-            gamma=settings.discount,
-            gae_lambda=settings.trace,
-            clip_range=settings.clip,
-            ent_coef=settings.entropy,
-            policy_kwargs={**policy, "log_std_init": settings.initial_log_std},
+            n_steps=settings.n_steps,
+            batch_size=settings.batch_size,
+            n_epochs=settings.n_epochs,
+            gamma=settings.gamma,
+            gae_lambda=settings.gae_lambda,
+            clip_range=settings.clip_range,
+            ent_coef=settings.ent_coef,
+            policy_kwargs={**policy, "log_std_init": settings.log_std_init},
             seed=seed,
             device="cpu",
         )
@@ -39,15 +39,15 @@ def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, se
         "MlpPolicy",
         environment,
         learning_rate=schedule,
-        buffer_size=settings.buffer,
-        learning_starts=settings.first_random,
-        batch_size=settings.batch,
-        tau=settings.soft_update,
-        gamma=settings.discount,
-        train_freq=1,
-        gradient_steps=settings.updates,
-        ent_coef=f"auto_{settings.entropy}",
-        target_entropy=settings.target_entropy * environment.actions,
+        buffer_size=settings.buffer_size,
+        learning_starts=settings.learning_starts,
+        batch_size=settings.batch_size,
+        tau=settings.tau,
+        gamma=settings.gamma,
+        train_freq=settings.train_freq,
+        gradient_steps=settings.gradient_steps,
+        ent_coef=settings.ent_coef,
+        target_entropy=settings.target_entropy_per_motor * environment.actions,
         policy_kwargs=policy,
         seed=seed,
         device="cpu",
@@ -62,7 +62,7 @@ def actor_of(learner: BaseAlgorithm, settings: PPOSettings | SACSettings) -> Act
     else:
         layers, head, squash = policy.actor.latent_pi, policy.actor.mu, "tanh"
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
-    actor = Actor(linear[0].in_features, settings.hidden, head.out_features, "tanh" if squash == "tanh" else "clip")
+    actor = Actor(linear[0].in_features, settings.net_arch, head.out_features, "tanh" if squash == "tanh" else "clip")
     for ours, theirs in zip([*actor.layers, actor.head], [*linear, head], strict=True):
         ours.load_state_dict({name: tensor.clone() for name, tensor in theirs.state_dict().items()})
     return actor
@@ -90,10 +90,10 @@ class Watcher(BaseCallback):
 
 def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
     """Train on the native batch of NumPy arrays."""
-    learner = make_learner(settings, SB3VecEnv(training_batch(run.task, settings.robots)), run.seed)
+    learner = make_learner(settings, SB3VecEnv(training_batch(run.task, settings.n_envs)), run.seed)
     learner.set_logger(run.logger)
     try:
-        learner.learn(settings.steps, callback=Watcher(run, settings))
+        learner.learn(settings.n_timesteps, callback=Watcher(run, settings))
     except ValueError as error:
         if "of distribution" in str(error):  # as Torch says of actions that are drawn from no numbers
             run.diverged(learner.num_timesteps, error)

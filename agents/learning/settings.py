@@ -1,10 +1,13 @@
-"""Typed settings of learners; the YAML files in configs/agents hold what differs from the defaults."""
+"""Typed settings of learners, under the names that Stable-Baselines3 and rl_zoo3 give them.
+
+The YAML files in configs/agents hold what differs from the defaults.
+"""
 
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, field_validator, model_validator
 
 from caster_gym.agents.control.protocol import AgentSettings
 from caster_gym.agents.learning import usual_names as usual
@@ -17,10 +20,29 @@ Units: TypeAlias = Annotated[int, Field(gt=0, le=16_384)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
+class LinearSchedule(Frozen):
+    """A number that goes linearly from its start to its end while a policy is trained."""
+
+    start: PositiveFloat
+    end: NonNegativeFloat = 0.0
+
+    def at(self, remaining: float) -> float:
+        """The number when this share of the training remains, 1 … 0; beyond the end as at the end."""
+        return self.end + (self.start - self.end) * max(remaining, 0.0)
+
+
+Schedule: TypeAlias = PositiveFloat | LinearSchedule
+
+
+def scheduled(value: Schedule, remaining: float) -> float:
+    """A constant or scheduled number when this share of the training remains, 1 … 0."""
+    return value.at(remaining) if isinstance(value, LinearSchedule) else value
+
+
 class LearnerSettings(AgentSettings):
     """Settings of a learner, whose policy is a network of dense layers, `caster_gym.agents.learning.actor.Actor`."""
 
-    steps: PositiveInt  # control periods of all robots together
+    n_timesteps: PositiveInt  # control periods of all robots together
     validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
 
     @property
@@ -30,39 +52,38 @@ class LearnerSettings(AgentSettings):
 
     @abstractmethod
     def learn(self, run: "Run") -> None:
-        """Train for `steps`, with calls of `run.advance` in between, and of `run.finish` at the end in any case."""
+        """Train for `n_timesteps`; call `run.advance` in between, and `run.finish` at the end in any case."""
 
 
 class GradientLearner(LearnerSettings):
     """What our learners have in common."""
 
-    hidden: Annotated[tuple[Units, ...], Field(min_length=1)] = (128, 128)  # units of each layer, ReLU
-    discount: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.97  # per control period
-    learning_rate: PositiveFloat
-    falling: bool = True  # learning rate falls linearly to zero
+    net_arch: Annotated[tuple[Units, ...], Field(min_length=1)] = (128, 128)  # units of each layer, ReLU
+    gamma: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.97  # discount per control period
+    learning_rate: Schedule  # a number, or {start: …, end: …}
 
 
 class OnPolicy(GradientLearner):
     """Proximal policy optimisation (Schulman et al., 2017), whoever computes it."""
 
-    steps: PositiveInt = 2_000_000  # control periods of all robots together
-    learning_rate: PositiveFloat = 7e-4
-    robots: PositiveInt = 128
-    horizon: PositiveInt = 128  # control periods between updates
-    batch: Annotated[int, Field(ge=2)] = 2048  # of one step, an advantage could not be normalised
-    epochs: PositiveInt = 5
-    trace: Fraction = 0.95  # λ of generalised advantage estimation
-    clip: PositiveFloat = 0.2
-    initial_log_std: Annotated[float, Field(ge=-20.0, le=2.0)] = -0.7  # of exploration, as a share of the action
-    entropy: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0  # weight of exploration's entropy in the loss
+    n_timesteps: PositiveInt = 2_000_000
+    learning_rate: Schedule = LinearSchedule(start=7e-4)
+    n_envs: PositiveInt = 128  # robots
+    n_steps: PositiveInt = 128  # control periods of each robot between updates
+    batch_size: Annotated[int, Field(ge=2)] = 2048  # of one step, an advantage could not be normalised
+    n_epochs: PositiveInt = 5
+    gae_lambda: Fraction = 0.95
+    clip_range: PositiveFloat = 0.2
+    log_std_init: Annotated[float, Field(ge=-20.0, le=2.0)] = -0.7  # of exploration, as a share of the action
+    ent_coef: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _batches_fit(self) -> Self:
-        if self.batch > self.robots * self.horizon:
-            smaller = "make it smaller, or " if self.robots * self.horizon > 1 else ""
+        if self.batch_size > self.n_envs * self.n_steps:
+            smaller = "make it smaller, or " if self.n_envs * self.n_steps > 1 else ""
             raise ValueError(
-                f"'batch' must be at most robots · horizon = {self.robots * self.horizon} steps, got {self.batch}: "
-                f"{smaller}take more robots or a longer horizon"
+                f"'batch_size' must be at most n_envs · n_steps = {self.n_envs * self.n_steps} steps, got "
+                f"{self.batch_size}: {smaller}take a greater n_envs or n_steps"
             )
         return self
 
@@ -95,13 +116,13 @@ class RslPPOSettings(OnPolicy, OnTensors):
 
     @model_validator(mode="after")
     def _batches_are_whole(self) -> Self:
-        if self.robots * self.horizon % self.batch:
-            whole = self.robots * self.horizon
-            smaller = next((size for size in range(self.batch, 1, -1) if whole % size == 0), None)
-            larger = next(size for size in range(self.batch, whole + 1) if whole % size == 0)
+        if self.n_envs * self.n_steps % self.batch_size:
+            whole = self.n_envs * self.n_steps
+            smaller = next((size for size in range(self.batch_size, 1, -1) if whole % size == 0), None)
+            larger = next(size for size in range(self.batch_size, whole + 1) if whole % size == 0)
             nearest = f"smaller one that does is {smaller}" if smaller else f"larger one that does is {larger}"
             raise ValueError(
-                f"'batch' must divide robots · horizon = {whole} steps, got {self.batch}: the next {nearest}"
+                f"'batch_size' must divide n_envs · n_steps = {whole} steps, got {self.batch_size}: the next {nearest}"
             )
         return self
 
@@ -119,25 +140,25 @@ class SHACSettings(GradientLearner, OnTensors):
     algorithm: Literal["shac"]
     compile: bool = True  # fuse the robots' step into few kernels, for which Torch needs a C++ compiler
     substeps: PositiveInt | None = None  # RK4 steps of a period while learning; None: as few as the casters allow
-    steps: PositiveInt = 800_000  # control periods of all robots together
-    learning_rate: PositiveFloat = 1.2e-2
-    critic_learning_rate: PositiveFloat = 5e-3
-    robots: PositiveInt = 64
-    window: PositiveInt = 16  # control periods through which a gradient passes
+    n_timesteps: PositiveInt = 800_000
+    learning_rate: Schedule = LinearSchedule(start=1.2e-2)
+    critic_learning_rate: Schedule = LinearSchedule(start=5e-3)
+    n_envs: PositiveInt = 64  # robots
+    n_steps: PositiveInt = 16  # control periods of the window through which a gradient passes
     restarts: Annotated[float, Field(ge=0.0, le=1.0)] = 0.05  # share of the robots that start anew before a window
-    critic_batch: PositiveInt = 256
-    critic_epochs: PositiveInt = 4
-    trace: Fraction = 0.95  # λ of the critic's targets
-    soft_update: Fraction = 0.8  # share of the critic that its target takes over after every window
-    greatest_gradient: PositiveFloat = 1.0  # a longer gradient of the policy is shortened to that norm
+    batch_size: PositiveInt = 256  # of the critic
+    n_epochs: PositiveInt = 4  # of the critic
+    gae_lambda: Fraction = 0.95  # λ of the critic's targets, TD(λ)
+    tau: Fraction = 0.8  # share of the critic that its target takes over after every window
+    max_grad_norm: PositiveFloat = 1.0  # a longer gradient of the policy is shortened to that norm
     noise: NonNegativeFloat = 0.0  # standard deviation of what exploration adds to actions
 
     @model_validator(mode="after")
     def _batches_fit(self) -> Self:
-        if self.critic_batch > self.robots * self.window:
+        if self.batch_size > self.n_envs * self.n_steps:
             raise ValueError(
-                f"'critic_batch' must be at most robots · window = {self.robots * self.window} steps, got "
-                f"{self.critic_batch}: make it smaller, or take more robots or a longer window"
+                f"'batch_size' must be at most n_envs · n_steps = {self.n_envs * self.n_steps} steps, got "
+                f"{self.batch_size}: make it smaller, or take a greater n_envs or n_steps"
             )
         return self
 
@@ -153,25 +174,39 @@ class SACSettings(GradientLearner):
 
     usual_names: ClassVar[Mapping[str, str]] = usual.SAC
     algorithm: Literal["sac"]
-    steps: Annotated[int, Field(ge=2)] = 500_000  # some random, and then some of learning
-    learning_rate: PositiveFloat = 1e-3
-    robots: PositiveInt = 32
-    batch: PositiveInt = 256
-    updates: PositiveInt = 4  # gradient steps for each control period of all robots
-    buffer: PositiveInt = 500_000  # transitions
-    first_random: PositiveInt = 10_000  # steps before learning starts
-    soft_update: Fraction = 0.005
-    entropy: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05  # coefficient to begin with; it is adapted
-    target_entropy: Annotated[
-        float, Field(ge=-20.0, le=0.6931)
-    ] = -2.0  # [nat] for each driven motor; exploration shrinks until it is reached
+    n_timesteps: Annotated[int, Field(ge=2)] = 500_000  # some random, and then some of learning
+    learning_rate: Schedule = LinearSchedule(start=1e-3)
+    n_envs: PositiveInt = 32  # robots
+    batch_size: PositiveInt = 256
+    train_freq: PositiveInt = 1  # control periods of all robots between updates
+    gradient_steps: PositiveInt = 4  # of each update
+    buffer_size: PositiveInt = 500_000  # transitions
+    learning_starts: PositiveInt = 10_000  # steps before learning starts
+    tau: Fraction = 0.005
+    ent_coef: Annotated[float, Field(gt=0.0, le=100.0)] | str = "auto_0.05"  # fixed, or adapted from auto_… on
+    target_entropy_per_motor: Annotated[float, Field(ge=-20.0, le=0.6931)] = -2.0  # [nat] exploration shrinks to it
+
+    @field_validator("ent_coef")
+    @classmethod
+    def _coefficient_is_adapted_or_fixed(cls, coefficient: float | str) -> float | str:
+        if isinstance(coefficient, str):
+            word, _, start = coefficient.partition("_")
+            try:
+                possible = word == "auto" and 0.0 < float(start or 1.0) <= 100.0
+            except ValueError:
+                possible = False
+            if not possible:
+                raise ValueError(
+                    f"must be a number, or begin with one up to 100 and be adapted, as auto_0.05, got {coefficient!r}"
+                )
+        return coefficient
 
     @model_validator(mode="after")
     def _learning_begins(self) -> Self:
-        if self.first_random >= self.steps:
+        if self.learning_starts >= self.n_timesteps:
             raise ValueError(
-                f"'first_random' must be below the steps in all, {self.steps}, got {self.first_random}: nothing would "
-                "be learned"
+                f"'learning_starts' must be below n_timesteps, {self.n_timesteps}, got {self.learning_starts}: nothing "
+                "would be learned"
             )
         return self
 

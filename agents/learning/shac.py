@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from caster_gym import load_robot
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.actor import Actor
-from caster_gym.agents.learning.settings import SHACSettings
+from caster_gym.agents.learning.settings import SHACSettings, scheduled
 from caster_gym.agents.learning.tensors import check_compiler, torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.engines.time_step import longest_time_step, substeps_for
@@ -67,26 +67,26 @@ class ShortHorizon:
         torch.manual_seed(seed)
         size, actions = task.layout.size, len(task.robot.driven)
         self.task, self.settings = task, settings
-        self.actor = Actor(size, settings.hidden, actions, "tanh").to(task.device, task.dtype)
-        self.critic = Critic(size, settings.hidden, settings.discount).to(task.device, task.dtype)
+        self.actor = Actor(size, settings.net_arch, actions, "tanh").to(task.device, task.dtype)
+        self.critic = Critic(size, settings.net_arch, settings.gamma).to(task.device, task.dtype)
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
         self.actor_optimizer = torch.optim.Adam(
-            self.actor.parameters(), settings.learning_rate, betas=MOMENTA, fused=True
-        )
-        self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), settings.critic_learning_rate, fused=True)
-        keys = torch.randint(2**63 - 1, (settings.robots,), dtype=torch.int64).to(task.device)
+            self.actor.parameters(), betas=MOMENTA, fused=True
+        )  # `improve` sets the rates
+        self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), fused=True)
+        keys = torch.randint(2**63 - 1, (settings.n_envs,), dtype=torch.int64).to(task.device)
         self.state, self.outcome = task.begin(keys)
 
     def improve(self, progress: float) -> dict[str, float]:
         """One window and one step of both; progress of the training, 0 … 1. Returns what is worth recording."""
-        left = 1.0 - progress if self.settings.falling else 1.0
-        self._set_rate(self.actor_optimizer, left * self.settings.learning_rate)
-        self._set_rate(self.critic_optimizer, left * self.settings.critic_learning_rate)
+        rate = scheduled(self.settings.learning_rate, 1.0 - progress)
+        self._set_rate(self.actor_optimizer, rate)
+        self._set_rate(self.critic_optimizer, scheduled(self.settings.critic_learning_rate, 1.0 - progress))
         self.start_some_anew()
         gain, window = self.gain()
         self.actor_optimizer.zero_grad()
         torch.autograd.backward(-gain)
-        norm = nn.utils.clip_grad_norm_(self.actor.parameters(), self.settings.greatest_gradient)
+        norm = nn.utils.clip_grad_norm_(self.actor.parameters(), self.settings.max_grad_norm)
         if bool(torch.isfinite(norm)):  # a robot that blew up must not take the policy with it
             self.actor_optimizer.step()
         loss = self.teach_critic(window)
@@ -94,12 +94,12 @@ class ShortHorizon:
             "reward": float(window.rewards.mean()),
             "gradient": float(norm),
             "critic_loss": loss,
-            "learning_rate": left * self.settings.learning_rate,
+            "learning_rate": rate,
         }
 
     def start_some_anew(self) -> None:
         """A new episode for each robot with the probability that the settings say."""
-        chosen = torch.rand(self.settings.robots, device=self.task.device) < self.settings.restarts
+        chosen = torch.rand(self.settings.n_envs, device=self.task.device) < self.settings.restarts
         if bool(chosen.any()):
             self.state, self.outcome = self.task.restart(self.state, self.outcome, where=chosen)
 
@@ -108,12 +108,12 @@ class ShortHorizon:
 
         The robots have moved on afterwards, and carry no gradient into the next window.
         """
-        discount, last = self.settings.discount, self.settings.window - 1
+        discount, last = self.settings.gamma, self.settings.n_steps - 1
         state, outcome = self.state, self.outcome
         total = torch.zeros((), dtype=self.task.dtype, device=self.task.device)
         weight = torch.ones_like(state.progress)
         seen, met = [], []
-        for k in range(self.settings.window):
+        for k in range(self.settings.n_steps):
             seen.append(outcome.observations.detach())
             state, outcome = self.task.step(state, self._explore(outcome.observations))
             ended = outcome.ended
@@ -131,7 +131,7 @@ class ShortHorizon:
         self.state, self.outcome = state.detached(), _detached(outcome)
         after, rewards, terminated, ends = (torch.stack(parts) for parts in zip(*met, strict=True))
         window = Window(torch.stack(seen), rewards, self._expected(after, terminated), ends)
-        return total / (self.settings.window * self.settings.robots), window
+        return total / (self.settings.n_steps * self.settings.n_envs), window
 
     def _explore(self, observations: Tensor) -> Tensor:
         actions: Tensor = self.actor(observations)
@@ -144,12 +144,12 @@ class ShortHorizon:
     def teach_critic(self, window: Window) -> float:
         """Several passes over the window in batches drawn at random; returns the mean loss of the last one."""
         observations = window.observations.flatten(0, 1)
-        targets = td_lambda(window, self.settings.discount, self.settings.trace).flatten()
+        targets = td_lambda(window, self.settings.gamma, self.settings.gae_lambda).flatten()
         losses: list[Tensor] = []
-        for _ in range(self.settings.critic_epochs):
+        for _ in range(self.settings.n_epochs):
             order = torch.randperm(len(targets), device=targets.device)
             losses = []
-            for batch in torch.split(order, self.settings.critic_batch):
+            for batch in torch.split(order, self.settings.batch_size):
                 loss = self.critic.loss(observations[batch], targets[batch])
                 self.critic_optimizer.zero_grad()
                 torch.autograd.backward(loss)
@@ -157,7 +157,7 @@ class ShortHorizon:
                 losses.append(loss.detach())
         with torch.no_grad():
             for slow, fast in zip(self.target.parameters(), self.critic.parameters(), strict=True):
-                slow.lerp_(fast, self.settings.soft_update)
+                slow.lerp_(fast, self.settings.tau)
         return float(torch.stack(losses).mean())
 
     @staticmethod
@@ -206,10 +206,10 @@ def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
     learner = ShortHorizon(make_task(run.task, settings), settings, run.seed)
     steps = 0
     try:
-        while steps < settings.steps:
+        while steps < settings.n_timesteps:
             run.advance(steps, lambda: frozen(learner.actor))
-            facts = learner.improve(steps / settings.steps)
-            steps += settings.window * settings.robots
+            facts = learner.improve(steps / settings.n_timesteps)
+            steps += settings.n_steps * settings.n_envs
             run.record(steps, {f"train/{name}": value for name, value in facts.items()})
     finally:
         run.finish(steps, lambda: frozen(learner.actor))

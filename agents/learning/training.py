@@ -99,10 +99,10 @@ def _raise_errors(futures: Sequence["Future[None]"]) -> None:
 @contextmanager
 def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
     done = [0] * len(jobs)
-    with tqdm(total=sum(job.agent.steps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
+    with tqdm(total=sum(job.agent.n_timesteps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
 
         def show(job: int, steps: int, verdict: str) -> None:
-            done[job] = min(steps, jobs[job].agent.steps)
+            done[job] = min(steps, jobs[job].agent.n_timesteps)
             bar.n = sum(done)
             if verdict:
                 bar.set_postfix_str(f"{jobs[job].name}: {verdict}", refresh=False)

@@ -5,15 +5,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NoReturn
 
+import numpy as np
 from stable_baselines3.common.logger import KVWriter, configure
 
-from caster_gym.agents.comparison.evaluation import test_batch
+from caster_gym.agents.comparison.evaluation import bare, test_batch
 from caster_gym.agents.comparison.metrics import in_words
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation, verdict_on, write_history
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bundle
-from caster_gym.agents.learning.settings import LearnerSettings
+from caster_gym.agents.learning.settings import GradientLearner, LearnerSettings, scheduled
+from caster_gym.envs.observation import ObservationLayout
 from caster_gym.report.provenance import versions
 
 STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
@@ -37,13 +39,23 @@ class Run:
         self._diverged = False
         self._validating = 0.0
         self._started = time.perf_counter()
-        self._due = settings.steps / settings.validations
+        self._due = settings.n_timesteps / settings.validations
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """What the parts of an observation mean."""
+        return bare(self.validation).engine.layout
+
+    @property
+    def actions(self) -> int:
+        """Number of actions of a robot."""
+        return int(np.prod(self.validation.single_action_space.shape or ()))
 
     def advance(self, steps: int, actor: Callable[[], Actor]) -> None:
         """So many steps are done by now; validate what `actor` returns where that is due."""
         self.steps = steps
         if steps >= self._due:
-            self._due += self.settings.steps / self.settings.validations
+            self._due += self.settings.n_timesteps / self.settings.validations
             self.validate(actor())
         self.report(steps, in_words(self.history[-1].verdict) if self.history else "")
 
@@ -56,8 +68,10 @@ class Run:
     def diverged(self, steps: int, cause: BaseException | None = None) -> NoReturn:
         """End the run, whose policy is no longer one; what was validated before is kept."""
         self._diverged = True
-        rate = getattr(self.settings, "learning_rate", None)
-        advice = "" if rate is None else f", with a learning_rate of {rate:g}; try a smaller one"
+        advice = ""
+        if isinstance(self.settings, GradientLearner):
+            rate = scheduled(self.settings.learning_rate, 1.0)
+            advice = f", with a learning_rate of {rate:g}; try a smaller one"
         raise ValueError(f"training has diverged after {steps} steps{advice}") from cause
 
     def validate(self, actor: Actor) -> None:
