@@ -18,7 +18,18 @@ TASK = {
     "validation": [{**RANDOM, "seed": 1, "count": 2}],
     "test": [{**RANDOM, "seed": 2, "count": 2}],
 }
-TINY = ["--set", "steps=512", "--set", "robots=8", "--set", "horizon=32", "--set", "batch=64", "--set", "hidden=[8]"]
+TINY = [
+    "--set",
+    "n_timesteps=512",
+    "--set",
+    "n_envs=8",
+    "--set",
+    "n_steps=32",
+    "--set",
+    "batch_size=64",
+    "--set",
+    "net_arch=[8]",
+]
 
 
 @pytest.fixture
@@ -97,8 +108,8 @@ def test_each_command_explains_itself(call, command):
             "--set start={radius:0.0265}: a colon needs a space after it, as in 'radius: 0.0265'",
         ),
         (["train", "--set", "stepz=3"], "did you mean 'n_steps'?"),
-        (["train", "--set", "steps=many"], "should be a whole number, got 'many'"),
-        (["train", "--set", "steps=["], "--set n_timesteps=[ cannot be read as YAML: expected the node content"),
+        (["train", "--set", "n_timesteps=many"], "should be a whole number, got 'many'"),
+        (["train", "--set", "n_timesteps=["], "--set n_timesteps=[ cannot be read as YAML: expected the node content"),
     ],
 )
 def test_mistakes_get_one_sentence(call, tmp_path, arguments, message):
@@ -107,7 +118,7 @@ def test_mistakes_get_one_sentence(call, tmp_path, arguments, message):
 
 
 def test_exponents_are_numbers(call, tmp_path):
-    tiny = [*TINY[2:], "--set", "steps=1e2", "--set", "learning_rate=1e-3"]
+    tiny = [*TINY[2:], "--set", "n_timesteps=1e2", "--set", "learning_rate=1e-3"]
     assert call("train", "ppo", *tiny, "--task", "task.yaml", "--out", "run").exit_code == 0
     agent = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text(encoding="utf-8"))["agent"]
     assert (agent["n_timesteps"], agent["learning_rate"]) == (100, 0.001)
@@ -288,7 +299,7 @@ def test_a_start_that_fails_is_in_nobodys_way(call, tmp_path, wrong, message):
     """After the mistake is mended, the same --out is taken; what was to be overwritten is there until then."""
     (tmp_path / "fast.yaml").write_text(yaml.safe_dump({**TASK, "train": [{"shape": "circle", "duration": 0.5}]}))
     (tmp_path / "lost.yaml").write_text(yaml.safe_dump({**TASK, "robot": "nowhere.yaml"}))
-    usual = [*TINY[:2], "--set", "robots=2", *TINY[4:], "--task", "task.yaml", "--out", "run"]
+    usual = [*TINY[:2], "--set", "n_envs=2", *TINY[4:], "--task", "task.yaml", "--out", "run"]
     failed = call("train", *usual, *wrong)
     assert failed.exit_code == 2
     assert message in failed.stderr.strip().splitlines()[-1]
@@ -391,11 +402,11 @@ def test_mistakes_in_an_export_get_one_sentence(call, tmp_path, arguments, messa
         ),
         (["train", "--task", "track.yaml"], "what comes with the package is called 'track'"),
         (
-            ["train", "sac", "--set", "steps=5000"],
+            ["train", "sac", "--set", "n_timesteps=5000"],
             "'learning_starts' must be below n_timesteps, 5000, got 10000",
         ),
-        (["train", "--set", "hidden=[1e9]"], "number 1 of 'net_arch' should be less than or equal to 16384"),
-        (["train", "--set", "robots=1e12"], "robots at most"),
+        (["train", "--set", "net_arch=[1e9]"], "number 1 of 'net_arch' should be less than or equal to 16384"),
+        (["train", "--set", "n_envs=1e12"], "robots at most"),
         (["watch", "--seconds", "1e400", "--save", "a.gif"], "seconds must be positive and finite, got inf"),
         (
             ["watch", "--save", "a.gif", "--path", "7", "--task", "task.yaml"],

@@ -82,7 +82,7 @@ def test_gain_is_the_discounted_return_and_what_the_critic_expects_after_it():
     """Summed by hand from the window's own rewards, with episodes of two periods in a window of three."""
     learning = learner(longest=2)
     gain, window = learning.gain()
-    r, v, g = window.rewards, window.after, learning.settings.discount
+    r, v, g = window.rewards, window.after, learning.settings.gamma
     assert window.ended.tolist() == [[False] * 4, [True] * 4, [False] * 4]
     total = r[0] + g * r[1] + g * g * v[1] + r[2] + g * v[2]
     assert gain.item() == pytest.approx(float(total.sum()) / (3 * 4), rel=1e-12)
@@ -189,7 +189,7 @@ def test_a_frozen_policy_does_not_learn_any_more():
 
 def test_the_rate_falls_and_the_last_window_hardly_learns():
     learning = learner()
-    assert learning.improve(0.75)["learning_rate"] == pytest.approx(0.25 * learning.settings.learning_rate)
+    assert learning.improve(0.75)["learning_rate"] == pytest.approx(0.25 * learning.settings.learning_rate.start)
     before = torch.nn.utils.parameters_to_vector(learning.actor.parameters()).detach().clone()
     learning.improve(1.0)
     assert torch.equal(torch.nn.utils.parameters_to_vector(learning.actor.parameters()), before)
