@@ -18,18 +18,8 @@ TASK = {
     "validation": [{**RANDOM, "seed": 1, "count": 2}],
     "test": [{**RANDOM, "seed": 2, "count": 2}],
 }
-TINY = [
-    "--set",
-    "n_timesteps=512",
-    "--set",
-    "n_envs=8",
-    "--set",
-    "n_steps=32",
-    "--set",
-    "batch_size=64",
-    "--set",
-    "net_arch=[8]",
-]
+SIZES = ("n_timesteps=512", "n_envs=8", "n_steps=32", "batch_size=64", "net_arch=[8]")
+TINY = [word for size in SIZES for word in ("--set", size)]
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import DESCRIPTION, Bundle, PolicyDescription, save_bundle
 from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.track_task import TrackTask
 from caster_gym.robot import load_robot
 from caster_gym.shipped_files import names_of, read_settings
+from caster_gym.tasks.track.parameters import TrackParameters
 
 test_batch.__test__ = False  # a name that pytest would take for a test
 
@@ -71,20 +71,21 @@ BUNDLE_CODE = "from pathlib import Path\nPath(__file__).with_suffix('.ran').touc
 def stranger(tmp_path, monkeypatch):
     """A policy in its run, with a module beside each of its files; some file of it names the module."""
     policy = run_of(tmp_path, shipped("track"))
-    layout = ObservationLayout(load_robot("chung2008"), TrackTask().preview)
+    layout = ObservationLayout(load_robot("chung2008"), TrackParameters().preview)
     description = PolicyDescription(
         format=1,
         name="stranger:Policy",
         squash="clip",
         hidden=(4,),
         robot=layout.robot,
-        task=TrackTask(),
+        task=TrackParameters(),
         trained_with={"settings": {"algorithm": "stranger:Learner"}},
         versions={},
     )
     save_bundle(policy, Bundle(description, Actor(layout.size, (4,), 6, "clip")))
     for folder in (policy, tmp_path):
         (folder / "stranger.py").write_text(BUNDLE_CODE, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)  # so that whoever imports it would find it
     monkeypatch.chdir(policy)
     return policy
 

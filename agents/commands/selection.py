@@ -11,6 +11,7 @@ from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
 from caster_gym.agents.registry import RESULTS, read_agent
 from caster_gym.configuration import is_yaml, parse, read_yaml
 from caster_gym.shipped_files import names_of, read_settings
+from caster_gym.tasks.registry import refuse_imports
 
 DEFAULT_TASK = "track"
 RUN = "run.yaml"  # beside the policies of a training run
@@ -62,12 +63,12 @@ def choose_task(agent: str, task: str | None) -> ChosenTask:
     agent: folder of a policy, or name of another agent. Which task a policy was trained on stands in the run.yaml of
     its training run, one or two folders above it.
     """
+    name = DEFAULT_TASK if task is None else task
+    settings = read_settings(TaskSettings, "tasks", name)  # which may load code, as a file of the run must not
     run = _run_of(agent)
     trained = None if run is None else _trained_on(run)
     if task is None and trained is not None:
         return ChosenTask(trained, f"Task {_named(trained) or f'of {run}'}, on which the policy was trained.")
-    name = DEFAULT_TASK if task is None else task
-    settings = read_settings(TaskSettings, "tasks", name)
     if trained is not None:
         other = _named(trained) or f"that of {run}"
         same, differs = ", on which the policy was trained.", f"; the policy was trained on another one, {other}."
@@ -92,6 +93,7 @@ def _trained_on(run: Path) -> TaskSettings | None:
     content = read_yaml(run)
     if "agent" not in content or not isinstance(content.get("task"), dict):
         return None
+    refuse_imports(content["task"].get("environment"), f"{run}: task")
     return parse(TaskSettings, content["task"], f"{run}: task")
 
 

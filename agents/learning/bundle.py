@@ -25,7 +25,7 @@ from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import Robot
 from caster_gym.tasks.building import observation_layout
 from caster_gym.tasks.parameters import TaskParameters
-from caster_gym.tasks.registry import all_tasks, find_task
+from caster_gym.tasks.registry import all_tasks, find_task, refuse_imports
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.specification import FeatureSpecification
 
@@ -172,6 +172,7 @@ def load_policy(folder: str | Path) -> Bundle:
         raise ConfigurationError(
             f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
         )
+    refuse_imports(content.get("environment"), str(folder / DESCRIPTION))
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
     actions = description.actions or len(description.robot.driven)
     actor = Actor(description.layout.size, description.hidden, actions, description.squash)

@@ -3,12 +3,15 @@
 Wherever a task is named, `module:Name` stands for a `Task` of a module of one's own, which needs no entry here.
 """
 
+import sys
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gymnasium import register
+
+from caster_gym.configuration import ConfigurationError
 
 if TYPE_CHECKING:
     from caster_gym.tasks.task import Task
@@ -29,6 +32,15 @@ def find_task(name: "str | Task") -> "Task":
     if name not in TASKS and ":" not in name:
         raise ValueError(f"the task must be {KNOWN}, got {name!r}")
     return _loaded(TASKS.get(name, name))
+
+
+def refuse_imports(name: object, source: str) -> None:
+    """Refuse a task of a module that is not loaded yet, in a file that a stranger may have written."""
+    if isinstance(name, str) and ":" in name and name.partition(":")[0] not in sys.modules:
+        raise ConfigurationError(
+            f"{source}: 'environment' is {name!r}, but a file of a policy must not load code: give the policy's task "
+            "yourself by --task, or import its module first"
+        )
 
 
 def all_tasks() -> Iterator["Task"]:
