@@ -275,7 +275,7 @@ def check_joints(joints: tuple[str, ...] | list[str], caster_count: int) -> tupl
 
 
 def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
-    """A robot that comes with the package, by its name, or one of your own: from a YAML file or the mapping in one.
+    """The robot of a name, such as "tidybot2", of a YAML file of your own, or of a mapping with the same content.
 
     >>> import caster_gym
     >>> caster_gym.load_robot("tidybot2").caster_count

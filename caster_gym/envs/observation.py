@@ -21,7 +21,7 @@ class Part(NamedTuple):
 class ObservationLayout:
     """Names the parts of the observations of one robot and task, and turns them back into physical units.
 
-    Agents that need physical quantities decode them from the observation: nobody sees more than anybody else.
+    Agents that need physical quantities decode them from the observation, so that all agents observe the same.
     preview: how far ahead the reference is shown, in seconds ("s") or metres along the path ("m"). nearest: number of
     obstacles shown.
 

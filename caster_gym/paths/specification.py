@@ -34,7 +34,7 @@ _POINT_SIZES = {2: "spline", 3: "spline", 4: "timed"}  # numbers of (x, y), (x, 
 
 
 def read_paths(path: PathLike) -> tuple[AnyPath, ...]:
-    """Checked paths from whatever names or holds one, or from a sequence of these.
+    """Paths, read and checked, from a name, a file, an array, a mapping, a Trajectory, or a sequence of these.
 
     The name of a shape stands for it with its defaults; that of a file, for what docs/files.md says; a mapping holds a
     shape and its parameters. A list or an array of points (x, y) [m] or (x, y, heading) [m, m, rad] is a spline; one of

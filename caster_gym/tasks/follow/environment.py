@@ -1,17 +1,17 @@
-"""CasterFollow-v0: follow a path at the robot's own pace, among walls and pillars, with motor torques."""
+"""CasterFollow-v0: follow a path at a speed that the robot chooses, among walls and pillars, with motor torques."""
 
 from caster_gym.tasks.environment import TaskEnv, TaskVectorEnv
 from caster_gym.tasks.follow import TASK
 
 
 class CasterFollowEnv(TaskEnv):
-    """An omnidirectional robot on powered casters follows a path as fast as it may, inside a corridor.
+    """An omnidirectional robot on powered casters follows a path inside a corridor, at a speed that it chooses.
 
-    **Progress** is the arc length s of the point of the path nearest to the robot, sought from the progress so far to
-    0.2 m ahead: it never falls, a shortcut across a crossing earns nothing, nor does a loop backward.
+    **Progress** is the arc length s of the point of the path nearest to the robot, among the points from the progress
+    so far to 0.2 m ahead. It never falls. Shortcuts across a crossing and loops backward earn nothing.
 
-    **Reference** is that point, with the speed and acceleration that a time law has there: from rest to rest, the
-    fastest within the speed limit (1 m/s) and a margin (80 %) of the motors. Nobody has to keep to it.
+    **Reference** is that point, with the speed and acceleration of a time law: from rest to rest, as fast as the speed
+    limit (1 m/s) and a margin (80 %) of the motors allow. The time law is not binding.
 
     **Action** as for `CasterTrackEnv`.
 
