@@ -96,6 +96,7 @@ def test_a_path_is_chosen_by_name_or_index(setup, path, index):
     assert module._index(path, batch) == index
 
 
+@pytest.mark.slow
 def test_without_save_episodes_follow_each_other_until_the_window_is_closed(setup, window, monkeypatch):
     moments = []
     show = module.Viewer.show

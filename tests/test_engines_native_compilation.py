@@ -152,7 +152,6 @@ def fleets(tmp_path_factory):
     copy = folder / "site-packages"
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "caster_gym", copy / "caster_gym", ignore=ignored)
-    shutil.copytree(ROOT / "configs", copy / "caster_gym" / "configs", ignore=ignored)
     kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "PYTHONPATH")}
 
     def run(place):

@@ -116,6 +116,7 @@ def odd_robots(count, seed):
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_allowed_steps_stay_as_bounded_as_short_ones():
     """Robots of any numbers, at their longest steps: no more energy than at a quarter of these."""
     rows = odd_robots(60, 5)

@@ -47,6 +47,7 @@ def asked(robot, state, action, wrench):
     return (force / (robot.floor_friction * loads)).max(), joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [0.0, 0.04])
 def test_traction_use_is_the_greatest_within_the_period_under_whatever_pushes(height):
     robot = standing_high(random_robot(301, 3), height)

@@ -105,6 +105,7 @@ def told(tmp_path_factory):
     return run(COLD, folder).stderr.splitlines(), run(COLD, folder).stderr.splitlines()
 
 
+@pytest.mark.slow
 def test_a_task_announces_its_compilation_once(told):
     """With the start of an episode its step is compiled, so that there is one wait; that of a batch is another one."""
     announced = "caster_gym: compiling for 2 casters (CasterTrack, 3 previewed points{}), about {} s, once"
@@ -112,10 +113,12 @@ def test_a_task_announces_its_compilation_once(told):
     assert told[0] == ["made", alone, "reset", "stepped", "batch reset", together, "batch stepped"]
 
 
+@pytest.mark.slow
 def test_what_was_compiled_is_not_announced_again(told):
     assert told[1] == ["made", "reset", "stepped", "batch reset", "batch stepped"]
 
 
+@pytest.mark.slow
 def test_torch_alone_compiles_and_announces_nothing(tmp_path):
     done = run(TORCH, tmp_path / "cache")
     assert (done.stdout, done.stderr) == ("0\n", "")

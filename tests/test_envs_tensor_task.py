@@ -68,6 +68,7 @@ def test_what_is_seen_at_a_start_depends_on_the_robots_own_numbers():
     assert (slope != 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
 @pytest.mark.parametrize("name", ["track", "follow"])
 def test_each_part_is_one_graph_for_the_compiler(name, part):

@@ -91,6 +91,7 @@ def test_episodes_are_those_of_the_compiled_batch(task):
     assert ends >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", list(IDS))
 def test_episodes_among_obstacles_are_those_of_the_compiled_batch(task):
     """Pillars and walls beside two paths, in a room: impacts and lasting contacts."""

@@ -18,6 +18,7 @@ def test_episodes_are_those_of_the_compiled_batch(task):
     assert failures + ends >= 3
 
 
+@pytest.mark.slow
 def test_episodes_among_obstacles_are_those_of_the_compiled_batch():
     """Pillars and walls beside two paths: impacts in which wheels slip, and lasting contacts."""
     floor = {"friction": 0.4}
@@ -36,6 +37,7 @@ def test_single_precision_stays_within_a_millimetre():
     assert_allclose(told["wheel_slip"], infos["wheel_slip"], rtol=0.0, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
 def test_gradients_pass_and_are_those_of_differences(dtype):
     """From slips and poses, where wheels slide and where they stand still at first, back to the actions."""
@@ -58,6 +60,7 @@ def test_gradients_pass_and_are_those_of_differences(dtype):
         assert_allclose(float((slope * way).sum()), float(difference), rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
 def test_each_part_is_one_graph_for_the_compiler(part):
     task = TorchTask("track", path=CIRCLE, fields={"floor": ISLANDS}, dtype=torch.float64)

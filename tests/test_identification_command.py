@@ -59,6 +59,7 @@ def found(short, settings):
     return identify(robot, read_recording(short, robot), settings.unknowns, settings.start)
 
 
+@pytest.mark.slow
 def test_the_command_leaves_all_that_is_promised_or_nothing(short, settings, tmp_path):
     out, told = tmp_path / "out", []
     words = identify_file(short, settings, out, False, lambda: told.append(1))
@@ -77,6 +78,7 @@ def test_the_command_leaves_all_that_is_promised_or_nothing(short, settings, tmp
         identify_file(out / "mine.csv", settings, out, True)
 
 
+@pytest.mark.slow
 def test_the_files_hold_the_numbers_of_the_identification(found, short, settings, tmp_path):
     write_identification(found, short, settings, tmp_path)
     text = (tmp_path / "identified.md").read_text(encoding="utf-8")
@@ -108,6 +110,7 @@ def test_a_contradiction_is_refused_with_the_files_name_and_can_be_overruled(sho
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
     told = replace(
         found,
@@ -127,6 +130,7 @@ def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
     assert "# motor_lag: 0 s; motors that follow at once need no wrapper" in at_once
 
 
+@pytest.mark.slow
 def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(found, short, settings, tmp_path):
     write_identification(found, short, settings, tmp_path)
     robot, original = load_robot(tmp_path / "robot.yaml"), load_robot("chung2008")

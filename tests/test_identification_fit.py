@@ -40,6 +40,7 @@ def loaded():
     return record(robot_with(CHUNG, LOAD), 2.5, 0.02, seed=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "starts", "with_twist"),
     [
@@ -61,6 +62,7 @@ def test_without_noise_the_truth_is_found(name, seed, starts, with_twist):
     assert found.robot.platform.mass == pytest.approx(robot.platform.mass + found.estimates[0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_recording_of_finer_time_steps_is_told_within_one_percent():
     truth, count, finer = {**LOAD, "trail": 0.027}, 126, 16
     robot = robot_with(CHUNG, truth)
@@ -145,6 +147,7 @@ def test_what_is_hardly_told_apart_is_named_with_its_correlation():
     assert f"a correlation of {correlation:+.3f}," in note
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """Of 50 intervals of 95 %, 42 or more hold the truth in all but one in 20,000 samples, were they independent."""
     robot = CHUNG.model_copy(update={"casters": CHUNG.casters[:2]})  # for speed

@@ -22,6 +22,7 @@ from scripts.impact_peer import (
 GRIP = 1e3  # friction of a floor on which nothing slips
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
 def test_on_a_floor_that_holds_mujocos_impulse_is_ours(name):
     """The wheels' inertia answers as the equations say; MuJoCo lets casters turn during its contact, by up to 20°."""
@@ -34,6 +35,7 @@ def test_on_a_floor_that_holds_mujocos_impulse_is_ours(name):
         assert ours[0] > loose
 
 
+@pytest.mark.slow
 def test_on_a_floor_that_cannot_hold_it_the_robot_is_nearly_free():
     """tidybot2 asks for 14 to 50 times what its floor has: its wheels slip, and the wall meets its body."""
     robot = load_robot("tidybot2")

@@ -18,6 +18,7 @@ FEW = 4
 BENT = "viscous part bent by 20 % at 20 rad/s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["the model's own", BENT])
 def test_errors_of_estimates_are_as_large_as_their_intervals_say(law):
     """Squared errors over variances have mean 1, whichever law friction has.

@@ -85,6 +85,7 @@ def test_ratios_are_taken_turn_by_turn():
     assert Ratio("", "ours", "not measured").values(measured) == []
 
 
+@pytest.mark.slow
 def test_what_limits_the_engines_is_told_of_torch_and_a_gpu_where_they_are(accuracy):
     """Shares are taken turn by turn: half of the speed in both turns is 50 %, though the second turn is a slow one."""
     ours = "bare bare_cores bare_one one one_beneath one_engine engine_cores env_fewer"
@@ -144,6 +145,7 @@ def accuracy():
     return measure_accuracy(ROBOT, 3)
 
 
+@pytest.mark.slow
 def test_ours_is_exact_where_mujoco_slips(accuracy):
     """A thousandth of MuJoCo's error at more than twice its step; the wheels of its robot slip, but mostly roll."""
     assert MUJOCO_STEP < 0.5 * RK4_STEP
@@ -151,6 +153,7 @@ def test_ours_is_exact_where_mujoco_slips(accuracy):
     assert all(0.001 < slip < 0.05 for slip in accuracy.slips)
 
 
+@pytest.mark.slow
 def test_ours_is_of_fourth_order(accuracy):
     """Half of the step leaves a sixteenth of the error; steps this long leave room for higher orders."""
     order = accuracy.ours[COARSE_STEP] / accuracy.ours[RK4_STEP]
@@ -178,6 +181,7 @@ def sections():
     return [("Ours", "Ours.", ours), ("Peers", "Theirs.", peer_rows(ROBOT, name, 1, 1e-9))]
 
 
+@pytest.mark.slow
 def test_everything_is_measured_and_shown(sections, accuracy):
     """Smoke: one call of each row; every goal has its verdict, every ratio of what was measured its line."""
     rows = [row for _, _, those in sections for row in those]
@@ -193,6 +197,7 @@ def test_everything_is_measured_and_shown(sections, accuracy):
     assert "nan" not in text
 
 
+@pytest.mark.slow
 def test_rows_that_ratios_compare_exist(sections):
     """A key with a spelling mistake would make its ratio vanish from the page. Torch and a GPU may be missing here."""
     keys = {row.key for _, _, those in sections for row in those} | TENSORS

@@ -64,6 +64,7 @@ def test_episodes_of_free_robots_end_by_time():
                 np.testing.assert_array_equal(info["terminal_observation"], observations[robot])
 
 
+@pytest.mark.slow
 def test_speeds_are_measured():
     """A smoke test."""
     settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
@@ -76,6 +77,7 @@ def point(steps, seconds, error, failures=0):
     return Point(steps, seconds, TrackVerdict(error, 2.0 * error, 0.01, failures, 0.9))
 
 
+@pytest.mark.slow
 def test_training_is_measured_in_pairs_beside_busy_processes(monkeypatch):
     """Each thread count as often as the other, and nothing is left running."""
     started = []
@@ -189,6 +191,7 @@ def test_time_of_validations_is_left_out(monkeypatch):
     assert clock[0] == 300.0
 
 
+@pytest.mark.slow
 def test_learners_on_tensors_are_measured(monkeypatch):
     """A smoke test, uncompiled."""
     monkeypatch.setattr(measure_training, "WINDOWS", 1)
@@ -202,6 +205,7 @@ def test_learners_on_tensors_are_measured(monkeypatch):
         rate_on_tensors(TASK, read_learner("ppo", {}))
 
 
+@pytest.mark.slow
 def test_a_run_makes_a_page(tmp_path, monkeypatch):
     """A smoke test with a goal that everybody meets; what takes long beside busy processes is left out."""
     rounds = [Round(1, 1.0, 1.0), Round(2, 2.0, 3.0)]

@@ -45,6 +45,7 @@ def test_mujoco_converges_to_the_equations():
     assert_limit_is_exact(CHUNG, START, TORQUE, 4.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_mujoco_converges_for_a_robot_of_which_nothing_is_zero(seed):
     """Offsets, mass centres, rotors, armatures, viscous friction, scrub, a motion at the start; four unlike casters.
@@ -57,6 +58,7 @@ def test_mujoco_converges_for_a_robot_of_which_nothing_is_zero(seed):
     assert_limit_is_exact(robot, state, rng.uniform(-0.3, 0.3, 8), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tidybot2", "xr4000"])
 def test_mujoco_converges_for_the_robots_that_were_built(name):
     robot = without_dry_friction(load_robot(name))
@@ -103,6 +105,7 @@ def test_slip_falls_with_the_step():
     assert coarse / fine == pytest.approx(2.0, rel=0.1)  # second order in the step
 
 
+@pytest.mark.slow
 def test_page_tells_what_was_compared(tmp_path):
     """Smoke of page, table and figure; the limit of MuJoCo is ours."""
     one = compare(CHUNG, strong_drives(CHUNG, 1)[0])
@@ -117,6 +120,7 @@ def test_page_tells_what_was_compared(tmp_path):
     assert "Dry friction does not hold" not in page([one], [], "")  # of robots that have none
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tidybot2", "xr4000"])
 def test_creep_below_breakaway_is_that_of_the_law(name):
     """s / √(1 − s²) of `coulomb_speed`; viscous friction and getting there take some of it, less of a sharper law."""

@@ -27,6 +27,7 @@ def scene_of(robot, name):
     return next(one for one in scenarios(load_robot(robot), 0) if one.name == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
 @pytest.mark.parametrize(
     ("name", "tolerance"),
@@ -44,6 +45,7 @@ def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance):
     assert mine.slip.max() > 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
 def test_drifts_end_where_mujocos_do(robot):
     """A way of some dm, on which wheels slide at up to 2 m/s: MuJoCo's contacts hop then."""
@@ -55,6 +57,7 @@ def test_drifts_end_where_mujocos_do(robot):
     assert np.sort(mine.slip.max(axis=0))[-2] > 0.3  # two wheels of three
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["onset of slip", "drift", "spin-up of a wheel", "regrip", "braking"])
 def test_a_step_of_the_tasks_is_nearer_to_the_limit_than_mujoco_at_a_finer_one(name):
     """Ours at 5 ms, MuJoCo at 1 ms, from ours at 0.25 ms."""
