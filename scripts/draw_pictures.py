@@ -59,13 +59,14 @@ def draw(folder: Path, environment: str, settings: dict[str, Any], seed: int, mo
     still = Viewer("rgb_array", PICTURE)
     for scene in episode:
         if scene.time <= moment:
-            frame = still.show([scene])
-    Image.fromarray(frame).save(folder / "robot.png", optimize=True)
+            still.show([scene])
+    Image.fromarray(still.frame()).save(folder / "robot.png", optimize=True)
     chosen = [scene for scene in episode if scene.time <= seconds][:: SKIPPED + 1]
     viewer = Viewer("rgb_array", FILM)
     with recording(folder / "robot.gif", 1.0 / (chosen[1].time - chosen[0].time), overwrite=True) as film:
         for scene in chosen:
-            film.add(viewer.show([scene]))
+            viewer.show([scene])
+            film.add(viewer.frame())
     if (size := (folder / "robot.gif").stat().st_size) > MOST_BYTES:
         raise SystemExit(f"robot.gif has {size / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g}; ask for fewer --seconds")
 

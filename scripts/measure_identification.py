@@ -110,7 +110,9 @@ def read_rows(path: Path) -> list[Held]:
                 row["law"],
                 int(row["recording"]),
                 row["name"],
-                *(float(row[key]) for key in ("truth", "estimate", "half_width")),
+                float(row["truth"]),
+                float(row["estimate"]),
+                float(row["half_width"]),
                 row["doubted"] == "True",
                 float(row["seconds"]),
             )

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
@@ -64,14 +65,15 @@ class FreeVecEnv(VecEnv):
         self.render_mode = None
         super().__init__(like.num_envs, like.observation_space, like.action_space)
         rng = np.random.default_rng(0)
-        self.observations = rng.normal(size=(BANK, like.num_envs, *(like.observation_space.shape or ())))
-        self.observations = self.observations.astype(np.float32)
+        drawn = rng.normal(size=(BANK, like.num_envs, *(like.observation_space.shape or ())))
+        self.observations: NDArray[np.float32] = drawn.astype(np.float32)
         self.rewards = rng.uniform(size=(BANK, like.num_envs)).astype(np.float32)
         self.longest, self.made = longest, 0
 
     def reset(self) -> VecEnvObs:
         """The first observations."""
-        return self.observations[0]
+        first: NDArray[np.float32] = self.observations[0]
+        return first
 
     def step_async(self, actions: np.ndarray) -> None:
         """Nothing needs the actions."""

@@ -71,12 +71,12 @@ def simulate(robot: Robot, state: ArrayLike, torque: ArrayLike, timestep: float,
     model, data = placed(robot, state, torque, timestep)
     platform, _ = joint_indices(robot, model)
     steps = round(duration / timestep)
-    pose = np.empty((steps + 1, 3))
+    pose: NDArray[np.float64] = np.empty((steps + 1, 3))
     pose[0] = data.qpos[platform]
     for step in range(1, steps + 1):
         mujoco.mj_step(model, data)
         pose[step] = data.qpos[platform]
-    return Motion(timestep * np.arange(steps + 1), pose)
+    return Motion(timestep * np.arange(steps + 1, dtype=np.float64), pose)
 
 
 def slip(robot: Robot, state: ArrayLike, torque: ArrayLike, timestep: float, duration: float) -> float:

@@ -91,7 +91,7 @@ def scenarios(robot: Robot, draw: int) -> list[Scenario]:
         return np.stack((eta, theta), -1)
 
     def one(name: str, friction: float, steering: Array, twist: Array, **how: Any) -> Scenario:
-        given = {"torque": nothing, "ramp": False, "duration": 0.5} | how
+        given: dict[str, Any] = {"torque": nothing, "ramp": False, "duration": 0.5} | how
         state = np.concatenate((np.zeros(3), twist, steering))
         rates = given.pop("rates", rolling(steering, twist))
         return Scenario(name, robot, draw, friction, state, rates, **given)
@@ -175,7 +175,8 @@ def peer(scene: Scenario, step: float) -> Course:
     body, joints = joint_indices(robot, model)
     wheels = [(model.body(f"wheel_{i}").id, caster.radius) for i, caster in enumerate(robot.casters, start=1)]
     full, count = data.ctrl.copy(), round(scene.duration / step)
-    times, poses = step * np.arange(count + 1), np.zeros((count + 1, 3))
+    times: Array = step * np.arange(count + 1, dtype=np.float64)
+    poses = np.zeros((count + 1, 3))
     slips, rolls = np.zeros((count + 1, n)), np.zeros((count + 1, n))
     slips[0], rolls[0], velocity = slip_of(scene), scene.rates[:, 1], np.zeros(6)
     for k in range(count):

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 from scripts.speed_robots import TRACK
@@ -111,7 +112,7 @@ def memory_rows(robot: str) -> list[Row]:
             f"{way}_{kind}",
             f"{title}, batch of {BIG:,}, {how}",
             "bytes a robot",
-            lambda code=code, kind=kind: fresh(code, robot, kind),
+            partial(fresh, code, robot, kind),
             goal,
             1,
         )

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from caster_gym.agents.learning.settings import LearnerSettings
+from caster_gym.agents.learning.settings import LearnerSettings, OnPolicy
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.report.pages import join_parts, paragraph
 from caster_gym.report.provenance import versions
@@ -147,7 +147,7 @@ def _compared(results: Results, goal: str) -> str:
 
 def _rows(results: Results, goal: float) -> list[tuple[str, ...]]:
     """A line for each run, then for each learner."""
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for name in results.agents:
         own = [one for one in results.courses if one.learner == name]
         for one in own:
@@ -169,7 +169,7 @@ def _rows(results: Results, goal: float) -> list[tuple[str, ...]]:
 
 def _trials(results: Results) -> list[tuple[str, ...]]:
     """A line for each learner and kind of path."""
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for name in results.agents:
         trials = [one for course in results.courses if course.learner == name for one in course.trials]
         for kind in dict.fromkeys(one.path.split()[0] for one in trials):
@@ -270,6 +270,7 @@ def _limits(results: Results) -> str:
             ),
         ]
     for name, (settings, rate) in results.rates.items():
+        assert isinstance(settings, OnPolicy)  # no others are measured
         parts.append(
             paragraph(
                 f"""On tensors and on the same core, `{name}` (rsl-rl-lib, with {settings.n_envs:,} robots whose step is

@@ -2,10 +2,12 @@
 
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv
 
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.learning.actor import Actor
@@ -14,7 +16,7 @@ from caster_gym.agents.learning.settings import LinearSchedule, PPOSettings, SAC
 from caster_gym.agents.learning.training_run import Run
 
 
-def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, seed: int) -> BaseAlgorithm:
+def make_learner(settings: PPOSettings | SACSettings, environment: VecEnv, seed: int) -> BaseAlgorithm:
     """A fresh SB3 algorithm."""
     rate = settings.learning_rate
     schedule = rate.at if isinstance(rate, LinearSchedule) else rate
@@ -47,7 +49,7 @@ def make_learner(settings: PPOSettings | SACSettings, environment: SB3VecEnv, se
         train_freq=settings.train_freq,
         gradient_steps=settings.gradient_steps,
         ent_coef=settings.ent_coef,
-        target_entropy=settings.target_entropy_per_motor * environment.actions,
+        target_entropy=settings.target_entropy_per_motor * int(np.prod(environment.action_space.shape or ())),
         policy_kwargs=policy,
         seed=seed,
         device="cpu",
