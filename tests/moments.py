@@ -1,6 +1,7 @@
 """Moments made by hand, and what a task's reward is of them."""
 
-from caster_gym.envs.tracking import Errors, Moment, Record, Situation, unless
+from caster_gym.envs.report import Record, Situation
+from caster_gym.envs.tracking import Errors, Moment, unless
 from caster_gym.mechanics.scalars import each
 
 NO_ERROR = Errors(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)

@@ -6,6 +6,8 @@ import torch
 from caster_gym import load_robot
 from caster_gym.engines.tensor.fleet import TorchFleet
 from caster_gym.engines.tensor.model import TorchModel
+from caster_gym.envs.report import REPORT
+from caster_gym.envs.rows import span
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.mechanics.parameters import robot_parameters
 from tests.random_robots import random_robot
@@ -118,7 +120,7 @@ def test_rewards_observations_and_reports_with_respect_to_actions(task):
 
     def outcome(actions):
         rewards, last, _ = rollout(task, start, actions)
-        return rewards + weighted(last.observations) + weighted(last.report[3:8])
+        return rewards + weighted(last.observations) + weighted(last.report[span(REPORT.deviation)])
 
     assert_slope_agrees(outcome, actions_of(task, 4, 3), tolerance=1e-5)  # traction and conditioning bend sharply
 

@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from caster_gym.envs.native import layout
+from caster_gym.envs.report import REPORT
 from caster_gym.envs.tensor.task import TorchTask
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
@@ -64,7 +64,7 @@ def test_what_is_seen_at_a_start_depends_on_the_robots_own_numbers():
     casters = tuple(caster._replace(trail=trail) for caster in task.parameters.casters)
     task.parameters = task.parameters._replace(casters=casters)
     _, outcome = task.begin(torch.arange(2))
-    (slope,) = torch.autograd.grad(outcome.report[layout.CONDITIONING].sum(), trail)
+    (slope,) = torch.autograd.grad(outcome.report[REPORT.deviation.conditioning].sum(), trail)
     assert (slope != 0.0).all()
 
 

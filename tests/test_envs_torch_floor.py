@@ -48,7 +48,7 @@ def test_gradients_pass_and_are_those_of_differences(dtype):
         state = start
         for _ in range(3):
             state, told = task.step(state, actions)
-        return state.bodies[:7].sum() + 0.1 * told.report[-3:].sum()
+        return state.bodies[:7].sum() + 0.1 * task.info(told.report)["wheel_slip"].sum()
 
     actions = torch.full((3, 6), 0.35, dtype=dtype, requires_grad=True)
     (slope,) = torch.autograd.grad(outcome(actions), actions)

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.envs import tracking
+from caster_gym.envs.observation import GAP_LIMIT, OBSERVATION_LIMIT, Neighbour, neighbour_seen, observed
 from caster_gym.envs.tracking import Reference
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
@@ -60,16 +61,18 @@ def test_touching_ends_an_episode_only_where_the_task_says_so(touching, pressing
 def test_an_obstacle_is_seen_from_the_robot():
     """Gap, at most 1 m, and the direction from it turned into B; too far away it has none."""
     state = unpack_state((1.0, 2.0, np.cos(0.7), np.sin(0.7), 0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 1.0))
-    gap, nx, ny = tracking.neighbour_seen(state, (0.4, np.cos(1.1), np.sin(1.1)))
-    assert_allclose([gap * 0.25, nx, ny], [0.4, np.cos(0.4), np.sin(0.4)], rtol=0.0, atol=EXACT)
-    assert tracking.neighbour_seen(state, (-0.01, 1.0, 0.0))[0] == -0.04
-    for far in (1.0, 3.0, np.inf):
-        assert tracking.neighbour_seen(state, (far, 1.0, 0.0)) == (4.0, 0.0, 0.0)
+    seen = neighbour_seen(state, Neighbour(0.4, np.cos(1.1), np.sin(1.1)))
+    assert_allclose(seen, [0.4, np.cos(0.4), np.sin(0.4)], rtol=0.0, atol=EXACT)
+    assert neighbour_seen(state, Neighbour(-0.01, 1.0, 0.0))[0] == -0.01
+    for far in (GAP_LIMIT, 3.0, np.inf):
+        assert neighbour_seen(state, Neighbour(far, 1.0, 0.0)) == (GAP_LIMIT, 0.0, 0.0)
 
 
 def test_observed_numbers_stay_within_the_space():
-    given = [-np.inf, -21.0, -20.0, 0.5, 20.0, 21.0, np.inf, np.nan]
-    assert [tracking.observed(x) for x in given] == [-20, -20, -20, 0.5, 20, 20, 20, -20]
+    most = OBSERVATION_LIMIT
+    given = [-np.inf, -most - 1.0, -most, 0.5, most, most + 1.0, np.inf, np.nan]
+    assert [observed(x, 1.0) for x in given] == [-most, -most, -most, 0.5, most, most, most, -most]
+    assert observed(0.5, 0.25) == 2.0
 
 
 def test_a_start_lies_in_the_frame_of_the_trajectory():

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.envs import tracking
-from caster_gym.envs.tracking import Reference, Situation
+from caster_gym.envs.observation import View, observe
+from caster_gym.envs.report import Situation
+from caster_gym.envs.tracking import Point, Reference
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
@@ -224,12 +226,10 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         parameters = robot_parameters(m.env.robot)
         state = unpack_state(tuple(map(float, m.state)))
         reference = Reference(*map(float, m.reference))
-        points = tuple(tuple(map(float, row[:7])) for row in m.coming)
+        points = tuple(Point(*map(float, row[: len(Point._fields)])) for row in m.coming)
         errors = tracking.tracking_errors(state, reference)
-        observation = tracking.observe(
-            state, reference, errors, points, (), all_joint_rates(state, parameters, None), parameters
-        )
-        assert_array_equal(np.array(observation, dtype=np.float32), m.observation)
+        view = View(state, reference, errors, points, (), all_joint_rates(state, parameters, None), parameters)
+        assert_array_equal(np.array(observe(view), dtype=np.float32), m.observation)
         torques = pairs(tuple(map(float, m.info["torque"])))
         record = untouched(m.info["power"])
         situation = Situation(0.0, 0.0, np.inf)
@@ -237,11 +237,12 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         moment, weights = tracking.Moment(state, reference, errors, effort, record, situation), weights_of(TASK)
         ended, terms = tracking.endings(moment, weights), TASK.reward(moment, weights)
         assert terms._asdict() == m.info["reward_terms"]
-        report = tracking.report(state, reference, errors, record, situation, ended, terms, parameters)
-        assert report.position_error == m.info["position_error"]
-        assert report.conditioning == m.info["conditioning"]
-        assert report.endings == (0.0, 0.0, 0.0)
-        assert np.arctan2(report.heading_sin, report.heading_cos) == pytest.approx(m.info["heading_error"], abs=1e-15)
+        report = tracking.report(state, reference, errors, record, situation, ended, parameters)
+        assert report.deviation.position_error == m.info["position_error"]
+        assert report.deviation.conditioning == m.info["conditioning"]
+        assert not any(report.endings)
+        turn = np.arctan2(report.deviation.heading_sin, report.deviation.heading_cos)
+        assert turn == pytest.approx(m.info["heading_error"], abs=1e-15)
         assert_array_equal(report.pose, m.info["pose"])
         assert_array_equal(report.reference_pose, m.info["reference_pose"])
 

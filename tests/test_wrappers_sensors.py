@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
-from caster_gym.envs import tracking
-from caster_gym.envs.tracking import Reference, observe, tracking_errors
+from caster_gym.envs.observation import OBSERVATION_LIMIT, View, observe
+from caster_gym.envs.tracking import Point, Reference, tracking_errors
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import unpack_state
 from caster_gym.mechanics.parameters import robot_parameters
@@ -106,7 +106,7 @@ def test_an_observation_is_what_a_robot_at_the_measured_state_would_see():
     moving(clean)
     samples = build_trajectories(PATH, ROBOT, PERIOD)[0].samples
     reference = Reference(*samples[30])
-    points = tuple(tuple(samples[30 + round(h / PERIOD), :7]) for h in PREVIEW)
+    points = tuple(Point(*samples[30 + round(h / PERIOD), : len(Point._fields)]) for h in PREVIEW)
     heading, away = layout.physical(shown, "heading_error"), layout.physical(shown, "position_error")
     for robot, flat in enumerate(clean.unwrapped.engine.states):
         beta = np.arctan2(reference.sin, reference.cos) - np.arctan2(heading[robot, 1], heading[robot, 0])
@@ -118,7 +118,7 @@ def test_an_observation_is_what_a_robot_at_the_measured_state_would_see():
         errors = tracking_errors(state, reference)
         parameters = robot_parameters(ROBOT)
         turning = all_joint_rates(state, parameters, None)
-        expected = np.array(observe(state, reference, errors, points, (), turning, parameters))
+        expected = np.array(observe(View(state, reference, errors, points, (), turning, parameters)))
         rates = next(part.place for part in layout.parts if part.name == "joint_rates")
         seen = np.ones(layout.size, dtype=np.bool_)
         seen[rates] = False  # measured on their own
@@ -176,7 +176,7 @@ def test_obstacles_are_seen_from_where_the_robot_is():
 def test_observations_stay_in_their_space():
     env = batch(SensorNoise(position=1e3, joint_rate=1e5), count=20)
     shown, _ = env.reset(seed=0)
-    assert np.abs(shown).max() == tracking.OBSERVATION_LIMIT
+    assert np.abs(shown).max() == OBSERVATION_LIMIT
     assert env.observation_space.contains(shown)
 
 

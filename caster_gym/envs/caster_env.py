@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from caster_gym.configuration import Frozen
 from caster_gym.envs.drawing import Renderer, checked_mode
-from caster_gym.envs.infos import named
 from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, TaskEngine
+from caster_gym.envs.report import named
 from caster_gym.envs.spaces import action_space, observation_space
 from caster_gym.envs.specification import plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at

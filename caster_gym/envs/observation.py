@@ -1,12 +1,221 @@
-"""What the parts of an observation mean: their places, units, frames and scales, by name."""
+"""What robots observe: one list of channels, from which come the numbers, their places, units and meanings.
 
-from typing import Literal, NamedTuple
+A channel is a function that sees something, and a line in `CHANNELS`, in whose order observations lie. The functions
+are on generic scalars; quantities are in the body frame B.
+"""
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.envs import tracking
+from caster_gym.envs.tracking import Errors, Point, Reference, to_body
+from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.parameters import (
+    CASTER_FIELDS,
+    PLATFORM_FIELDS,
+    CasterParameters,
+    PlatformParameters,
+    RobotParameters,
+)
+from caster_gym.mechanics.scalars import Scalar, clip, each, flatten, minimum, where
 from caster_gym.robot import Robot
+
+POSITION_UNIT = 0.1  # [m] an observed position error of 1
+PREVIEW_UNIT = 0.5  # [m] an observed distance to a previewed point of 1
+SPEED_UNIT = 1.0  # [m/s] also of a wheel's rim and of a pivot around its wheel
+SPEED_ERROR_UNIT = 0.25  # [m/s]
+YAW_RATE_UNIT = 2.0  # [rad/s]
+YAW_RATE_ERROR_UNIT = 0.5  # [rad/s]
+ACCELERATION_UNIT = 2.0  # [m/s²]
+YAW_ACCELERATION_UNIT = 4.0  # [rad/s²]
+GAP_UNIT = 0.25  # [m] to an obstacle
+GAP_LIMIT = 1.0  # [m] obstacles farther away look as if they were there
+OBSERVATION_LIMIT = 20.0  # observed quantities are clipped here, far beyond what a robot in its corridor reaches
+
+
+class Neighbour(NamedTuple):
+    """An obstacle nearby."""
+
+    gap: Scalar  # [m]
+    nx: Scalar  # unit normal, towards the robot, in W
+    ny: Scalar
+
+
+class View(NamedTuple):
+    """What there is to observe, in W unless said otherwise."""
+
+    state: State
+    reference: Reference
+    errors: Errors  # in B
+    preview: tuple[Point, ...]
+    nearest: tuple[Neighbour, ...]
+    rates: tuple[tuple[Scalar, Scalar], ...]  # θ̇, δ̇ of each caster [rad/s]
+    robot: RobotParameters
+
+
+def position_error(view: View) -> tuple[Scalar, ...]:
+    """Where the reference is."""
+    return view.errors.ahead, view.errors.left
+
+
+def heading_error(view: View) -> tuple[Scalar, ...]:
+    """How the reference is turned."""
+    return view.errors.cos, view.errors.sin
+
+
+def twist_error(view: View) -> tuple[Scalar, ...]:
+    """How much faster the reference is."""
+    return view.errors.vx, view.errors.vy, view.errors.omega
+
+
+def twist(view: View) -> tuple[Scalar, ...]:
+    """How fast the robot is."""
+    return view.state.twist
+
+
+def reference_acceleration(view: View) -> tuple[Scalar, ...]:
+    """How the reference changes its motion."""
+    ax, ay = to_body(view.state.heading, view.reference.ax, view.reference.ay)
+    return ax, ay, view.reference.alpha
+
+
+def directions(view: View) -> tuple[Scalar, ...]:
+    """Rolling directions of the casters."""
+    return flatten(view.state.directions)
+
+
+def joint_speeds(view: View) -> tuple[Scalar, ...]:
+    """Rolling and steering rates of the casters, as speeds of the rim and of the pivot around the wheel."""
+    return flatten(each(_caster_speeds, (), view.rates, view.robot.casters))
+
+
+def preview(view: View) -> tuple[Scalar, ...]:
+    """The coming points of the path."""
+    return flatten(each(_point_ahead, (view.state,), view.preview))
+
+
+def obstacles(view: View) -> tuple[Scalar, ...]:
+    """The nearest obstacles."""
+    return flatten(each(neighbour_seen, (view.state,), view.nearest))
+
+
+def _caster_speeds(rates: tuple[Scalar, Scalar], caster: CasterParameters) -> tuple[Scalar, Scalar]:
+    theta, delta = rates
+    return theta * caster.radius, delta * caster.trail
+
+
+def _point_ahead(state: State, point: Point) -> tuple[Scalar, ...]:
+    c, s = state.heading
+    ahead, left = to_body(state.heading, point.x - state.position[0], point.y - state.position[1])
+    vx, vy = to_body(state.heading, point.vx, point.vy)
+    return ahead, left, c * point.cos + s * point.sin, c * point.sin - s * point.cos, vx, vy, point.omega
+
+
+def neighbour_seen(state: State, neighbour: Neighbour) -> tuple[Scalar, Scalar, Scalar]:
+    """Gap to an obstacle [m], and the direction from it to the robot; far away, no direction."""
+    nx, ny = to_body(state.heading, neighbour.nx, neighbour.ny)
+    near = neighbour.gap < GAP_LIMIT
+    return minimum(neighbour.gap, GAP_LIMIT), where(near, nx, 0.0 * nx), where(near, ny, 0.0 * ny)
+
+
+Item: TypeAlias = Literal["robot", "caster", "point", "obstacle"]
+
+
+class Channel(NamedTuple):
+    """A line of the observation: physical value = observed · unit."""
+
+    name: str
+    see: Callable[[View], tuple[Scalar, ...]]  # physical values, of all items one behind the other
+    units: tuple[float, ...]  # of the values of one item
+    meaning: str  # with names of the item in braces
+    per: Item = "robot"
+    levers: tuple[str, ...] = ()  # fields of a caster [m] by which observed speeds are divided to give rates
+
+
+_TWIST = (SPEED_UNIT, SPEED_UNIT, YAW_RATE_UNIT)
+
+CHANNELS = (
+    Channel("position_error", position_error, (POSITION_UNIT,) * 2, "reference minus robot, ahead and left, in B [m]"),
+    Channel("heading_error", heading_error, (1.0,) * 2, "cos and sin of reference heading minus robot heading"),
+    Channel(
+        "twist_error",
+        twist_error,
+        (SPEED_ERROR_UNIT, SPEED_ERROR_UNIT, YAW_RATE_ERROR_UNIT),
+        "reference minus robot, vx, vy, ω, in B [m/s, rad/s]",
+    ),
+    Channel("twist", twist, _TWIST, "of the robot, vx, vy, ω, in B [m/s, rad/s]"),
+    Channel(
+        "reference_acceleration",
+        reference_acceleration,
+        (ACCELERATION_UNIT, ACCELERATION_UNIT, YAW_ACCELERATION_UNIT),
+        "of the reference point and heading, world derivative, components in B [m/s², rad/s²]",
+    ),
+    Channel("directions", directions, (1.0,) * 2, "cos δ_i, sin δ_i of each caster, in B", "caster"),
+    Channel(
+        "joint_rates",
+        joint_speeds,
+        (SPEED_UNIT,) * 2,
+        "θ̇_i, δ̇_i of each caster [rad/s]; observed as speeds r θ̇ and d δ̇",
+        "caster",
+        ("radius", "trail"),
+    ),
+    Channel(
+        "preview_{ahead}",
+        preview,
+        (PREVIEW_UNIT, PREVIEW_UNIT, 1.0, 1.0, *_TWIST),
+        "reference {ahead_in_words} ahead: ahead, left [m], cos and sin of its heading, vx, vy [m/s], ω [rad/s], in B",
+        "point",
+    ),
+    Channel(
+        "obstacle_{number}",
+        obstacles,
+        (GAP_UNIT, 1.0, 1.0),
+        "nearest obstacle but {nearer}: gap [m], direction from it to the robot, in B; farther than "
+        f"{GAP_LIMIT:g} m: that gap, and no direction",
+        "obstacle",
+    ),
+)
+
+
+def observe(view: View) -> tuple[Scalar, ...]:
+    """The observation, as `CHANNELS` say."""
+    seen: tuple[Scalar, ...] = ()
+    units: tuple[float, ...] = ()
+    for channel in CHANNELS:
+        values = channel.see(view)
+        seen, units = seen + values, units + channel.units * (len(values) // len(channel.units))
+    return each(observed, (), seen, units)
+
+
+def observed(value: Scalar, unit: float) -> Scalar:
+    """A number within the observation space; one that is not a number becomes its lower end."""
+    return clip(value if unit == 1.0 else value / unit, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+
+
+def observation_size(casters: int, points: int, nearest: int, channels: tuple[Channel, ...] = CHANNELS) -> int:
+    """Numbers in an observation of a robot with so many casters, with so many previewed points and obstacles."""
+    items = {"robot": 1, "caster": casters, "point": points, "obstacle": nearest}
+    return sum(len(channel.units) * items[channel.per] for channel in channels)
+
+
+def _check(channel: Channel) -> None:
+    """Refuse a channel that does not give a number for each of its units. Raises TypeError."""
+    robot = RobotParameters(PlatformParameters(*(1.0,) * PLATFORM_FIELDS), (CasterParameters(*(1.0,) * CASTER_FIELDS),))
+    point, reference = Point(*(1.0,) * len(Point._fields)), Reference(*(1.0,) * len(Reference._fields))
+    state = State((1.0, 1.0), (1.0, 0.0), (1.0, 1.0, 1.0), ((1.0, 0.0),), (), ())
+    errors = Errors(*(1.0,) * len(Errors._fields))
+    seen = channel.see(View(state, reference, errors, (point,), (Neighbour(1.0, 1.0, 0.0),), ((1.0, 1.0),), robot))
+    if len(seen) != len(channel.units):
+        raise TypeError(
+            f"channel {channel.name!r} of the observation has {len(channel.units)} units, and its function "
+            f"{channel.see.__name__} gives {len(seen)} numbers: there must be one for each"
+        )
+
+
+for _channel in CHANNELS:
+    _check(_channel)
 
 
 class Part(NamedTuple):
@@ -36,51 +245,27 @@ class ObservationLayout:
     def __init__(
         self, robot: Robot, preview: tuple[float, ...], unit: Literal["s", "m"] = "s", nearest: int = 0
     ) -> None:
-        n = robot.caster_count
-        speed, yaw = tracking.SPEED_UNIT, tracking.YAW_RATE_UNIT
-        error, yaw_error = tracking.SPEED_ERROR_UNIT, tracking.YAW_RATE_ERROR_UNIT
-        acceleration, yaw_acceleration = tracking.ACCELERATION_UNIT, tracking.YAW_ACCELERATION_UNIT
-        rates = [speed / scale for caster in robot.casters for scale in (caster.radius, caster.trail)]
-        point = [tracking.PREVIEW_UNIT] * 2 + [1.0] * 2 + [speed] * 2 + [yaw]
         self.robot = robot
         self.preview = preview
         self.unit = unit
         self.nearest = nearest
         self._parts: dict[str, Part] = {}
-        self._add("position_error", [tracking.POSITION_UNIT] * 2, "reference minus robot, ahead and left, in B [m]")
-        self._add("heading_error", [1.0] * 2, "cos and sin of reference heading minus robot heading")
-        self._add("twist_error", [error, error, yaw_error], "reference minus robot, vx, vy, ω, in B [m/s, rad/s]")
-        self._add("twist", [speed, speed, yaw], "of the robot, vx, vy, ω, in B [m/s, rad/s]")
-        self._add(
-            "reference_acceleration",
-            [acceleration, acceleration, yaw_acceleration],
-            "of the reference point and heading, world derivative, components in B [m/s², rad/s²]",
-        )
-        self._add("directions", [1.0] * (2 * n), "cos δ_i, sin δ_i of each caster, in B")
-        self._add("joint_rates", rates, "θ̇_i, δ̇_i of each caster [rad/s]; observed as speeds r θ̇ and d δ̇")
-        for horizon in preview:
-            self._add(
-                f"preview_{horizon:g}{unit}",
-                point,
-                f"reference {horizon:g} {unit} ahead: ahead, left [m], cos and sin of its heading, vx, vy [m/s], "
-                "ω [rad/s], in B",
-            )
-        for k in range(1, nearest + 1):
-            self._add(
-                f"obstacle_{k}",
-                [tracking.GAP_UNIT, 1.0, 1.0],
-                f"nearest obstacle but {k - 1}: gap [m], direction from it to the robot, in B; farther than "
-                f"{tracking.GAP_LIMIT:g} m: that gap, and no direction",
-            )
+        points = [{"ahead": f"{ahead:g}{unit}", "ahead_in_words": f"{ahead:g} {unit}"} for ahead in preview]
+        neighbours = [{"number": str(k + 1), "nearer": str(k)} for k in range(nearest)]
+        for channel in CHANNELS:
+            scale = list(channel.units)
+            if channel.per == "caster":
+                scale = scale * robot.caster_count
+                levers = [getattr(caster, lever) for caster in robot.casters for lever in channel.levers]
+                scale = [size / lever for size, lever in zip(scale, levers, strict=True)] if levers else scale
+            items = {"point": points, "obstacle": neighbours}
+            for words in items.get(channel.per, [{}]):
+                self._add(channel.name.format(**words), scale, channel.meaning.format(**words))
+        self.size = observation_size(robot.caster_count, len(preview), nearest)
 
     def _add(self, name: str, scale: list[float], meaning: str) -> None:
-        first = self.size
+        first = max((part.place.stop for part in self._parts.values()), default=0)
         self._parts[name] = Part(name, slice(first, first + len(scale)), np.array(scale), meaning)
-
-    @property
-    def size(self) -> int:
-        """Length of an observation."""
-        return max((part.place.stop for part in self._parts.values()), default=0)
 
     @property
     def parts(self) -> tuple[Part, ...]:

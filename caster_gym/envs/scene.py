@@ -6,12 +6,8 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.engines.native.lanes import BODY_ROWS
-from caster_gym.envs.native.layout import (
-    ENDINGS,
-    FIRST_POSE,
-    FIRST_RECORD,
-    FIXED_REPORT_ROWS,
-)
+from caster_gym.envs.report import REPORT, torque_rows
+from caster_gym.envs.rows import span
 from caster_gym.floor import Floor
 from caster_gym.mechanics import ground
 from caster_gym.mechanics.dynamics import forward_dynamics
@@ -25,6 +21,10 @@ from caster_gym.mechanics.separation import Obstacles
 from caster_gym.mechanics.slip import slip_step
 from caster_gym.mechanics.slip_state import unpack_slip_state
 from caster_gym.robot import Robot
+
+_RECORD = REPORT.record
+_HELD = span((_RECORD.held_x, _RECORD.held_y, _RECORD.held_moment))
+_IMPULSE, _POINT = span((_RECORD.impulse_x, _RECORD.impulse_y)), span((_RECORD.point_x, _RECORD.point_y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,7 @@ def draw_scene(
     time: float,
     state: Array,
     report: Array,
+    terms: int,
     wrench: Array,
     path: Array,
     corridor: float,
@@ -63,11 +64,11 @@ def draw_scene(
 ) -> Scene:
     """The scene of a robot with a state, see `TaskEngine.states`, and the report of its last control period.
 
-    wrench (3,): what pushed it from outside, beside obstacles, at C in B [N, N, N m]. time_step [s]: of the task.
+    terms: how many the reward has. wrench (3,): what pushed it from outside, beside obstacles, at C in B [N, N, N m].
+    time_step [s]: of the task.
     """
-    end, n = FIXED_REPORT_ROWS + 2 * robot.caster_count, robot.caster_count
-    torque, record = report[FIXED_REPORT_ROWS:end], report[FIRST_RECORD:]
-    push = wrench + record[9:12]
+    n = robot.caster_count
+    torque, push = report[torque_rows(terms, n)], wrench + report[_HELD]
     if floor is None:
         forces, slip = _ground_forces(robot, state, torque, push), np.zeros((n, 2))
     else:
@@ -82,11 +83,11 @@ def draw_scene(
         ground_forces=forces,
         path=path,
         corridor=corridor,
-        reference=report[FIRST_POSE + 4 : FIRST_POSE + 8],
+        reference=report[span(REPORT.reference_pose)],
         obstacles=obstacles,
-        impulse=record[1:3],
-        impact_point=record[4:6] if record[6] > 0.0 else np.full(2, np.nan),
-        failed=bool(report[:ENDINGS].any()),
+        impulse=report[_IMPULSE],
+        impact_point=report[_POINT] if report[_RECORD.impacts] > 0.0 else np.full(2, np.nan),
+        failed=bool(report[span(REPORT.endings)].any()),
         slip=slip,
         floor=floor,
     )

@@ -4,7 +4,7 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from caster_gym.envs.native.engine import TaskEngine
-from caster_gym.envs.tracking import OBSERVATION_LIMIT
+from caster_gym.envs.observation import OBSERVATION_LIMIT
 
 
 def observation_space(engine: TaskEngine) -> "Box[np.float32]":

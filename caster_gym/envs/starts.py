@@ -16,9 +16,10 @@ from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
-from caster_gym.envs.native.layout import FIRST_POSE, FIRST_SITUATION, POSITION_ERROR
 from caster_gym.envs.plan import PlaceName
 from caster_gym.envs.randomness import episode_seed, uniforms
+from caster_gym.envs.report import REPORT
+from caster_gym.envs.rows import span
 from caster_gym.envs.tracking import Reference, start
 from caster_gym.mechanics.integration import pack_state, unpack_state
 from caster_gym.mechanics.parameters import unpack_parameters
@@ -172,7 +173,7 @@ def _drawn_pose(engine: TaskEngine, selected: NDArray[np.int64]) -> Array:
     headless = states[selected]
     headless[:, 2:4] = 0.0  # a robot without a heading is shown the path's own, even where it is free
     engine.put(selected, headless)
-    x, y, cos, sin = engine.look().reports[FIRST_POSE + 4 : FIRST_POSE + 8, selected]
+    x, y, cos, sin = engine.look().reports[span(REPORT.reference_pose), selected]
     keys, coming = engine.episodes(selected)
     seeds = episode_seed(keys, coming - np.uint64(1))
     sides, forth, turns = (2.0 * uniforms(seeds, np.arange(1, 4)) - 1.0).T.copy()
@@ -186,7 +187,7 @@ def _drawn_pose(engine: TaskEngine, selected: NDArray[np.int64]) -> Array:
 def _find_place(engine: TaskEngine, selected: NDArray[np.int64], points: Array) -> None:
     """Set the progress of robots to the place of their path that is nearest to them."""
     engine.put(selected, progress=nearest_row(engine, engine.paths[selected], points))
-    engine.put(selected, progress=engine.look(progress_stays=False).reports[FIRST_SITUATION, selected])
+    engine.put(selected, progress=engine.look(progress_stays=False).reports[REPORT.situation.progress, selected])
 
 
 def nearest_row(engine: TaskEngine, paths: NDArray[np.int64], points: Array) -> Array:
@@ -237,12 +238,12 @@ def check_free(engine: TaskEngine, reports: Array, robots: NDArray[np.int64]) ->
 
     robots: indices of these robots in their batch. Raises ValueError.
     """
-    errors, gaps = reports[POSITION_ERROR], reports[FIRST_SITUATION + 2]
+    errors, gaps = reports[REPORT.deviation.position_error], reports[REPORT.situation.clearance]
     outside, inside = errors > engine.corridor, gaps < -ROUNDING
     if not (outside | inside).any():
         return
     i = int((outside | inside).argmax())
-    x, y = reports[FIRST_POSE : FIRST_POSE + 2, i]
+    x, y = reports[[REPORT.pose.x, REPORT.pose.y], i]
     place = f"the start of robot {robots[i]} at ({x:.3f}, {y:.3f}) m"
     if outside[i]:
         raise ValueError(

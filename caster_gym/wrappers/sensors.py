@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import NonNegativeFloat
 
 from caster_gym.arrays import Array
+from caster_gym.envs.observation import OBSERVATION_LIMIT
 from caster_gym.envs.randomness import uniforms
-from caster_gym.envs.tracking import OBSERVATION_LIMIT
 from caster_gym.wrappers.draws import normals
 from caster_gym.wrappers.feature import Feature, Observations, Place, Quantities, Range, Robots, Runtime, between
 

@@ -61,11 +61,11 @@ _LOOPS_AND_CHOICES |= {
 }
 
 
-def teach(module: ModuleType) -> None:
-    """Let compiled code call every function that a module defines, inlined."""
+def teach(module: ModuleType, *except_for: Callable[..., Any]) -> None:
+    """Let compiled code call every function that a module defines, inlined; but those that it overloads by itself."""
     for function in vars(module).values():
         own = isinstance(function, FunctionType) and function.__module__ == module.__name__
-        if own and function not in _LOOPS_AND_CHOICES:
+        if own and function not in _LOOPS_AND_CHOICES and function not in except_for:
             register_jitable(**INLINE)(function)
 
 

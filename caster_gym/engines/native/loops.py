@@ -58,15 +58,15 @@ def _pairs(flat: Any) -> Any:
 
 @overload(scalars.flatten, jit_options=INLINE, strict=False)
 def _flatten(nested: Any) -> Any:
-    half = len(nested) // 2
+    half = len(nested) // 2  # [:] since the compiler does not add named tuples
     if len(nested) > 4:
         return lambda nested: scalars.flatten(nested[:half]) + scalars.flatten(nested[half:])
     return [
         lambda nested: (),
-        lambda nested: nested[0],
-        lambda nested: nested[0] + nested[1],
-        lambda nested: nested[0] + nested[1] + nested[2],
-        lambda nested: nested[0] + nested[1] + nested[2] + nested[3],
+        lambda nested: nested[0][:],
+        lambda nested: nested[0][:] + nested[1][:],
+        lambda nested: nested[0][:] + nested[1][:] + nested[2][:],
+        lambda nested: nested[0][:] + nested[1][:] + nested[2][:] + nested[3][:],
     ][len(nested)]
 
 
@@ -85,6 +85,8 @@ def _apart(function: Any, arguments: Any) -> Any:
 @overload(scalars.each, jit_options=INLINE, strict=False)
 def _each(function: Any, shared: Any, *columns: Any) -> Any:
     count, half = len(columns[0]), len(columns[0]) // 2
+    if any(len(column) != count for column in columns):
+        raise TypeError(f"loops go over equally many items, got {', '.join(str(len(column)) for column in columns)}")
     if count < len(_EACH[len(columns)]):
         return _EACH[len(columns)][count]
     if len(columns) == 1:

@@ -15,12 +15,12 @@ from caster_gym.engines.native.held import Held
 from caster_gym.engines.native.lanes import LANES, block_count, from_lanes, to_lanes
 from caster_gym.engines.native.threads import over_blocks
 from caster_gym.engines.time_step import check_rows, check_time_step
-from caster_gym.envs.infos import named
 from caster_gym.envs.native import layout
 from caster_gym.envs.native import step as kernel
-from caster_gym.envs.native.layout import FIXED_REPORT_ROWS
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan
+from caster_gym.envs.report import RESULT, named
+from caster_gym.envs.rows import span
 from caster_gym.envs.scene import Scene, draw_scene
 from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import FloorTable, floor_table
@@ -29,6 +29,7 @@ from caster_gym.mechanics.separation import Obstacles
 from caster_gym.robot import Robot
 
 DRAW_A_PATH = -1
+_ENDED = span((RESULT.failed, RESULT.late))
 
 
 class Outcome(NamedTuple):
@@ -60,17 +61,19 @@ class TaskEngine:
             tuple(range(len(observed.preview))),
             tuple(range(observed.nearest)),
             tuple(range(robot.caster_count if pace.floor is not None else 0)),
+            tuple(range(len(plan.terms))),
         )
+        self._rows = layout.rows_of(self._sizes)
         self.slipping = len(self._sizes.slipping)  # wheels that may slip: none, or all
-        check_memory(count, layout.desk_rows(self._sizes))
+        check_memory(count, self._rows.end)
         self.spread = np.array([pace.start_offset, pace.start_turn])  # [m], [rad] greatest displacements of a start
         self.corridor, self.control_period = pace.corridor, pace.substeps * pace.time_step  # [m], [s]
-        self._report_rows = FIXED_REPORT_ROWS + 2 * robot.caster_count + self.slipping
-        self._told: NDArray[np.float64] | None = None  # latest reports of a batch that is drawn, copied for pictures
+        self.report_rows = self._rows.end - self._rows.report
+        self._kept_reports: NDArray[np.float64] | None = None  # latest of a batch that is drawn, copied for pictures
         self._late: NDArray[np.int64] | None = None  # (robots,) clocks at which episodes began, unless all were 0
-        kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
+        kept, end = self._rows.parameters, self._rows.commands
         self._build(
-            np.zeros((1, layout.desk_rows(self._sizes) * LANES) if count == 1 else (block_count(count), kept * LANES)),
+            np.zeros((1, self._rows.end * LANES) if count == 1 else (block_count(count), kept * LANES)),
             np.zeros((1, (end - kept) * LANES)),
             np.zeros((2, count), dtype=np.int64),
             np.zeros((2, count), dtype=np.uint64),
@@ -84,13 +87,13 @@ class TaskEngine:
         clocks: NDArray[np.int64],
         seeds: NDArray[np.uint64],
     ) -> None:
-        """Put what changes from step to step together with what stays. A robot alone lives on its desk, `blocks`."""
+        """Join what changes from step to step with what stays. A robot alone lives in its workspace, `blocks`."""
         plan, robot, count, floor = self.plan, self.robot, self.count, self._pace.floor
         among = len(plan.around.obstacles.radii) > 0
-        self._desk = blocks.reshape(-1) if count == 1 else np.zeros(layout.desk_rows(self._sizes) * LANES)
+        self._workspace = blocks.reshape(-1) if count == 1 else np.zeros(self._rows.end * LANES)
         self._world = layout.World(
             blocks=blocks,
-            parameters=self._desk_parameters(self._desk) if count == 1 else parameters,
+            parameters=self._workspace_parameters(self._workspace) if count == 1 else parameters,
             clocks=clocks,
             seeds=seeds,
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
@@ -104,20 +107,20 @@ class TaskEngine:
         )
         self._pools = (
             BufferPool((count, self.layout.size), np.float32),
-            BufferPool((self._report_rows, count), np.float64),
-            BufferPool((3, count), np.float64),
+            BufferPool((self.report_rows, count), np.float64),
+            BufferPool((len(RESULT), count), np.float64),
         )
         self._observation_size = self.layout.size
-        self._results = np.zeros(3)  # of a robot alone
+        self._results = np.zeros(len(RESULT))  # of a robot alone
         self._held: Held | None = None  # made when it is needed, since that may have to compile
 
-    def _desk_parameters(self, desk: NDArray[np.float64]) -> NDArray[np.float64]:
-        kept, end = layout.parameter_row(self._sizes), layout.command_row(self._sizes)
-        return desk[kept * LANES : end * LANES].reshape(1, -1)
+    def _workspace_parameters(self, workspace: NDArray[np.float64]) -> NDArray[np.float64]:
+        kept, end = self._rows.parameters, self._rows.commands
+        return workspace[kept * LANES : end * LANES].reshape(1, -1)
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy needs. All that compiled code refers to is put together anew around its arrays."""
-        rebuilt = ("_desk", "_world", "_pools", "_observation_size", "_results", "_held")
+        rebuilt = ("_workspace", "_world", "_pools", "_observation_size", "_results", "_held")
         state = {name: value for name, value in vars(self).items() if name not in rebuilt}
         return state | {"changing": self.changing}
 
@@ -157,14 +160,14 @@ class TaskEngine:
         for prepare in self.on_restart:
             prepare(selected)
         outcome = self._empty() if into is None else into
-        views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, 0)))
+        views = layout.Views(outcome.observations, outcome.reports, np.zeros((len(RESULT), 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         before = compilations()
-        kernel.restart(selected, paths, self._world, self.spread, views, self._desk, self._sizes)
+        kernel.restart(selected, paths, self._world, self.spread, views, self._workspace, self._sizes)
         if compilations() > before:
             self._compile_step()
-        if self._told is not None:
-            self._told[:, selected] = outcome.reports[:, selected]
+        if self._kept_reports is not None:
+            self._kept_reports[:, selected] = outcome.reports[:, selected]
         if self._late is not None:
             self._late[selected] = 0
             self._late = self._late if self._late.any() else None
@@ -189,14 +192,14 @@ class TaskEngine:
         observations, reports, results = (pool.take() for pool in self._pools)
         views = layout.Views(observations, reports, results)
         over_blocks(kernel.step_blocks, len(self._world.blocks), self._world, actions, views, self._sizes)
-        if self._told is not None:
-            self._told = reports.copy()
+        if self._kept_reports is not None:
+            self._kept_reports = reports.copy()
         if self.count == 1:
-            self._desk_report[:] = reports[:, 0]
-        terminated, truncated = results[1:] > 0.0
+            self._workspace_report[:] = reports[:, 0]
+        terminated, truncated = results[_ENDED] > 0.0
         if self._late is not None:
             truncated = self._over(self._late)
-        return Outcome(observations, results[0], terminated, truncated, reports)
+        return Outcome(observations, results[RESULT.reward], terminated, truncated, reports)
 
     def step_alone(
         self, action: NDArray[np.float32]
@@ -207,7 +210,7 @@ class TaskEngine:
         number.
         """
         observation = np.empty(self._observation_size, dtype=np.float32)
-        report = np.empty(self._report_rows)
+        report = np.empty(self.report_rows)
         held = self._held if self._held is not None else self._hold()
         if not kernel.step_single(held, action, observation, report):
             raise ValueError(f"action must hold numbers, got {action}")
@@ -215,7 +218,7 @@ class TaskEngine:
         return observation, reward, failed > 0.0, late > 0.0, report
 
     def _hold(self) -> Held:
-        self._held = Held((self._world, self._desk, self._results, self._sizes))
+        self._held = Held((self._world, self._workspace, self._results, self._sizes))
         return self._held
 
     def _compile_step(self) -> None:
@@ -225,7 +228,7 @@ class TaskEngine:
             if self.count == 1:
                 kernel.step_single(self._hold(), action, nothing.observations[0], nothing.reports[:, 0].copy())
             else:
-                views = layout.Views(nothing.observations, nothing.reports, np.zeros((3, self.count)))
+                views = layout.Views(nothing.observations, nothing.reports, np.zeros((len(RESULT), self.count)))
                 actions = np.zeros((self.count, len(action)), dtype=np.float32)
                 kernel.step_blocks(0, 0, self._world, actions, views, self._sizes)
 
@@ -243,12 +246,13 @@ class TaskEngine:
         outcome = self._empty()
         still_actions = np.zeros((self.count, len(self.robot.driven)), dtype=np.float32)
         if self.count > 1:
-            views = layout.Views(outcome.observations, outcome.reports, np.zeros((3, self.count)))
+            views = layout.Views(outcome.observations, outcome.reports, np.zeros((len(RESULT), self.count)))
             kernel.step_blocks(0, len(blocks), still, still_actions, views, self._sizes)
             return outcome
-        desk = blocks.reshape(-1)
-        held = Held((still._replace(parameters=self._desk_parameters(desk)), desk, np.zeros(3), self._sizes))
-        report = np.zeros(self._report_rows)
+        workspace = blocks.reshape(-1)
+        still = still._replace(parameters=self._workspace_parameters(workspace))
+        held = Held((still, workspace, np.zeros(len(RESULT)), self._sizes))
+        report = np.zeros(self.report_rows)
         kernel.step_single(held, still_actions[0], outcome.observations[0], report)
         outcome.reports[:, 0] = report
         return outcome
@@ -264,10 +268,10 @@ class TaskEngine:
         rows = self._world.blocks.reshape(len(self._world.blocks), -1, LANES)
         block, lane = selected // LANES, selected % LANES
         if states is not None:
-            rows[block, : layout.room_row(self._sizes), lane] = states
-            rows[block, layout.room_row(self._sizes), lane] = 0.0
+            rows[block, : self._rows.room, lane] = states
+            rows[block, self._rows.room, lane] = 0.0
         if progress is not None:
-            rows[block, layout.progress_row(self._sizes), lane] = progress
+            rows[block, self._rows.progress, lane] = progress
         if clocks is not None:
             self._world.clocks[0, selected] = clocks
             self._late = np.zeros(self.count, dtype=np.int64) if self._late is None else self._late
@@ -287,7 +291,7 @@ class TaskEngine:
             np.zeros(count),
             nothing,
             nothing.copy(),
-            np.zeros((self._report_rows, count)),
+            np.zeros((self.report_rows, count)),
         )
 
     @property
@@ -296,13 +300,13 @@ class TaskEngine:
 
         Where wheels may slip, the rates of all casters and the tilt follow (robots, 9 + 4 N), as in `pack_state`.
         """
-        return from_lanes(self._world.blocks, 0, layout.room_row(self._sizes), self.count)
+        return from_lanes(self._world.blocks, 0, self._rows.room, self.count)
 
     @states.setter
     def states(self, value: NDArray[np.float64]) -> None:
         to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, 0)
         if self._world.obstacles is not None:
-            to_lanes(np.zeros((self.count, 1)), self._world.blocks, layout.room_row(self._sizes))
+            to_lanes(np.zeros((self.count, 1)), self._world.blocks, self._rows.room)
 
     @property
     def wrenches(self) -> NDArray[np.float64]:
@@ -310,19 +314,19 @@ class TaskEngine:
 
         They act until they are set again; an episode starts without any, whatever was set before its first step.
         """
-        return from_lanes(self._world.blocks, layout.wrench_row(self._sizes), 3, self.count)
+        return from_lanes(self._world.blocks, self._rows.wrench, 3, self.count)
 
     @wrenches.setter
     def wrenches(self, value: NDArray[np.float64]) -> None:
         if np.shape(value) != (self.count, 3):
             raise ValueError(f"wrenches must have shape {(self.count, 3)}, got {np.shape(value)}")
-        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, layout.wrench_row(self._sizes))
+        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, self._rows.wrench)
 
     @property
     def parameters(self) -> NDArray[np.float64]:
         """Every robot's numbers (robots, fields), in the order of `pack_parameters`, as a copy."""
         everybody = np.broadcast_to(self._world.parameters, (block_count(self.count), self._world.parameters.shape[1]))
-        return from_lanes(everybody, 0, layout.parameter_rows(self._sizes), self.count)
+        return from_lanes(everybody, 0, self._rows.commands - self._rows.parameters, self.count)
 
     def check_parameters(self, rows: NDArray[np.float64], what: str | None = None) -> None:
         """Refuse robots of numbers (robots, fields) that the time step cannot follow; what: their name in the error."""
@@ -353,12 +357,12 @@ class TaskEngine:
         return np.array(self._world.clocks[1])
 
     def info(self, reports: NDArray[np.float64]) -> dict[str, Any]:
-        """Named quantities of all robots, or one; see `caster_gym.envs.infos`."""
+        """Named quantities of all robots, or one; see `caster_gym.envs.report.named`."""
         return named(reports, self.plan.terms, self.slipping)
 
     def scene(self, robot: int) -> Scene:
         """What there is to see of one robot."""
-        if self.count > 1 and self._told is None:
+        if self.count > 1 and self._kept_reports is None:
             self.keep_reports()
         path = int(self._world.clocks[1, robot])
         return draw_scene(
@@ -366,6 +370,7 @@ class TaskEngine:
             float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
             self.states[robot],
             self._report_of(robot),
+            len(self.plan.terms),
             self.wrenches[robot],
             self.plan.tables[path][:, :2],
             self._pace.corridor,
@@ -376,20 +381,20 @@ class TaskEngine:
 
     def keep_reports(self) -> None:
         """Keep a copy of every report from now on, which pictures of a batch need."""
-        if self._told is None and self.count > 1:
-            self._told = self.look().reports
+        if self._kept_reports is None and self.count > 1:
+            self._kept_reports = self.look().reports
 
     def _report_of(self, robot: int) -> NDArray[np.float64]:
         """The latest report of a robot, from where nobody else can have changed it."""
-        if self._told is not None:
-            return self._told[:, robot].copy()
-        return self._desk_report.copy()
+        if self._kept_reports is not None:
+            return self._kept_reports[:, robot].copy()
+        return self._workspace_report.copy()
 
     @property
-    def _desk_report(self) -> NDArray[np.float64]:
+    def _workspace_report(self) -> NDArray[np.float64]:
         """Where the latest report of a robot alone stands."""
-        row = layout.report_row(self._sizes)
-        return self._desk.reshape(-1, LANES)[row : row + self._report_rows, 0]
+        row = self._rows.report
+        return self._workspace.reshape(-1, LANES)[row : row + self.report_rows, 0]
 
     def _obstacles_beside(self, path: int) -> Obstacles:
         around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]

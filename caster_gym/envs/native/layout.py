@@ -1,32 +1,25 @@
-"""How the quantities of a task lie in memory, and what else a batch keeps.
+"""How the quantities of a task lie in memory, and what else a batch keeps. All arithmetic on rows is done here.
 
-Rows of a block, which is kept from step to step: state, room, wrench, progress. On a desk, which stays in the
-processor's cache, one block after the other is worked out; behind the rows of the block it has the robots' parameters,
-motor commands, mean motor torques, record, slip, friction of the floor, reference, preview, situation, nearest
-obstacles, observation, report. (Two arrays instead of one desk would stop the compiler from making SIMD loops.) Robots
-that are all alike share the parameters of one block, which then stay on the desk; a robot alone lives on its desk. The
-tuples in `Sizes` have an item per caster, per previewed point, per observed obstacle and per wheel that may slip: their
-lengths are part of their types, so that all rows are constants of the compiled code.
+A workspace, which stays in the processor's cache, is where one block of robots after the other is worked out; its parts
+are the fields of `Workspace`. Only the parts before the parameters are kept, in the block. (Two arrays instead of one
+workspace would stop the compiler from making SIMD loops.) Robots that are all alike share the parameters of one block,
+which then stay in the workspace; a robot alone lives in its workspace. The tuples in `Sizes` have an item per caster,
+per previewed point, per observed obstacle, per wheel that may slip and per reward term: their lengths are part of their
+types, so that all rows are constants of the compiled code.
 """
 
+from itertools import accumulate
 from typing import Any, NamedTuple
 
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from caster_gym.engines.native.compiler import INLINE
 from caster_gym.engines.native.lanes import BODY_ROWS
-from caster_gym.envs.native.reference import POINT_ROWS, REFERENCE_ROWS
-from caster_gym.envs.tracking import Record, Situation
+from caster_gym.envs.observation import CHANNELS, Channel, Neighbour, observation_size, observe, observed
+from caster_gym.envs.report import RECORD, REPORT_ROWS, Situation
+from caster_gym.envs.tracking import POINT_ROWS, Reference
 from caster_gym.mechanics.parameters import CASTER_FIELDS, PLATFORM_FIELDS
-
-RECORD_ROWS = len(Record._fields)
-SITUATION_ROWS = len(Situation._fields)
-NEIGHBOUR_ROWS = 3
-FIXED_REPORT_ROWS = 37
-LEFT_CORRIDOR, NOT_FINITE, TOUCHED, ENDINGS = 0, 1, 2, 3
-POSITION_ERROR, HEADING_SIN, HEADING_COS, CONDITIONING = 3, 4, 5, 6
-FIRST_TERM, TERMS, FIRST_POSE, FIRST_RECORD = 7, 6, 13, 21
-FIRST_SITUATION = FIRST_RECORD + RECORD_ROWS
+from caster_gym.mechanics.scalars import each
 
 
 class World(NamedTuple):
@@ -51,16 +44,41 @@ class Views(NamedTuple):
 
     observations: Any  # float32 (robots, size)
     reports: Any  # float64 (quantities, robots)
-    results: Any  # float64 (3, robots): reward, terminated, truncated
+    results: Any  # float64 (len(Result), robots)
 
 
 class Sizes(NamedTuple):
-    """As many items as there are casters, previewed points, obstacles in an observation, and wheels that may slip."""
+    """As many items as there are casters, previewed points, obstacles in an observation, and so on."""
 
     casters: tuple[int, ...]
     preview: tuple[int, ...]
     nearest: tuple[int, ...]
     slipping: tuple[int, ...]  # empty where wheels roll without slip, else as long as casters
+    terms: tuple[int, ...]  # of the reward
+
+
+class Workspace(NamedTuple):
+    """First row of each part of a workspace."""
+
+    state: int  # as in `pack_state`
+    room: int  # see `caster_gym.engines.native.guarding`
+    wrench: int  # external, at C, in B
+    progress: int  # [m] negative at the start of an episode
+    parameters: int  # of the robot; first of the parts that are not kept in a block
+    commands: int  # of the motors
+    torques: int  # mean, of the motors [N m]
+    record: int  # of the control period
+    slips: int  # greatest, of each wheel in the control period [m/s]
+    friction: int  # of the floor under each wheel
+    reference: int
+    preview: int
+    situation: int
+    nearest: int  # obstacles
+    observation: int
+    report: int  # its parts from here on
+    terms: int  # of the reward
+    motors: int  # their torques, and slips
+    end: int
 
 
 def state_rows(casters: int, slips: bool) -> int:
@@ -68,99 +86,70 @@ def state_rows(casters: int, slips: bool) -> int:
     return BODY_ROWS + 2 * casters + (2 * casters + 2 if slips else 0)
 
 
-@register_jitable(**INLINE)
-def room_row(sizes: Sizes) -> int:
-    """Row of the room, see `caster_gym.engines.native.guarding`."""
-    free = len(sizes.slipping)
-    return BODY_ROWS + 2 * len(sizes.casters) + (2 * free + 2 if free > 0 else 0)
+def rows_of(sizes: Sizes) -> Workspace:
+    """Where each part of a workspace begins."""
+    casters, preview, nearest, slipping, terms = (len(items) for items in sizes)
+    widths = Workspace(
+        state=state_rows(casters, slipping > 0),
+        room=1,
+        wrench=3,
+        progress=1,
+        parameters=PLATFORM_FIELDS + CASTER_FIELDS * casters,
+        commands=2 * casters,
+        torques=2 * casters,
+        record=len(RECORD),
+        slips=slipping,
+        friction=slipping,
+        reference=len(Reference._fields),
+        preview=POINT_ROWS * preview,
+        situation=len(Situation._fields),
+        nearest=len(Neighbour._fields) * nearest,
+        observation=observation_size(casters, preview, nearest),
+        report=REPORT_ROWS,
+        terms=terms,
+        motors=2 * casters + slipping,
+        end=0,
+    )
+    return Workspace(*accumulate(widths[:-1], initial=0))
+
+
+@overload(rows_of, jit_options=INLINE, strict=False)
+def _rows_of(sizes: Any) -> Any:
+    rows = rows_of(Sizes(*(tuple(range(len(items))) for items in sizes)))
+    return lambda sizes: rows
+
+
+@overload(observe, jit_options=INLINE, strict=False)
+def _observe(view: Any) -> Any:
+    views = dict(zip(view.fields, view.types, strict=True))
+    items = {"caster": len(views["rates"]), "point": len(views["preview"]), "obstacle": len(views["nearest"])}
+    units = sum((channel.units * items.get(channel.per, 1) for channel in CHANNELS), ())
+    see = _seen(CHANNELS)
+    return lambda view: each(observed, (), see(view), units)
+
+
+def _seen(channels: tuple[Channel, ...]) -> Any:
+    """A function for compiled code that sees all channels."""
+    if len(channels) < 4:
+        first, second, third = (*(channel.see for channel in channels), _nothing, _nothing)[:3]
+        return register_jitable(**INLINE)(lambda view: first(view) + second(view) + third(view))
+    start, middle, end = (_seen(channels[i * len(channels) // 3 : (i + 1) * len(channels) // 3]) for i in range(3))
+    return register_jitable(**INLINE)(lambda view: start(view) + middle(view) + end(view))
 
 
 @register_jitable(**INLINE)
-def wrench_row(sizes: Sizes) -> int:
-    """First row of the external wrench at C, in B."""
-    return room_row(sizes) + 1
+def _nothing(_view: Any) -> Any:
+    return ()
 
 
-@register_jitable(**INLINE)
-def progress_row(sizes: Sizes) -> int:
-    """Row of the progress [m], negative at the start of an episode."""
-    return wrench_row(sizes) + 3
+def as_many(numbers: tuple[Any, ...], items: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The numbers, of which there must be as many as items, else compiling raises TypeError."""
+    if len(numbers) != len(items):
+        raise TypeError(f"the reward has {len(numbers)} terms, and the task names {len(items)}")
+    return numbers
 
 
-@register_jitable(**INLINE)
-def parameter_row(sizes: Sizes) -> int:
-    """First row of the robot's parameters, behind the rows of a block."""
-    return progress_row(sizes) + 1
-
-
-@register_jitable(**INLINE)
-def parameter_rows(sizes: Sizes) -> int:
-    """Rows of the robot's parameters."""
-    return PLATFORM_FIELDS + CASTER_FIELDS * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def command_row(sizes: Sizes) -> int:
-    """First row of the motor commands."""
-    return parameter_row(sizes) + parameter_rows(sizes)
-
-
-@register_jitable(**INLINE)
-def torque_row(sizes: Sizes) -> int:
-    """First row of the mean motor torques [N m]."""
-    return command_row(sizes) + 2 * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def record_row(sizes: Sizes) -> int:
-    """First row of the record of the control period."""
-    return torque_row(sizes) + 2 * len(sizes.casters)
-
-
-@register_jitable(**INLINE)
-def slip_row(sizes: Sizes) -> int:
-    """First row of the greatest slip of each wheel in the control period [m/s]."""
-    return record_row(sizes) + RECORD_ROWS
-
-
-@register_jitable(**INLINE)
-def friction_row(sizes: Sizes) -> int:
-    """First row of the floor's friction under each wheel."""
-    return slip_row(sizes) + len(sizes.slipping)
-
-
-@register_jitable(**INLINE)
-def reference_row(sizes: Sizes) -> int:
-    """First row of the reference, with the previewed points behind it."""
-    return friction_row(sizes) + len(sizes.slipping)
-
-
-@register_jitable(**INLINE)
-def situation_row(sizes: Sizes) -> int:
-    """First row of the situation."""
-    return reference_row(sizes) + REFERENCE_ROWS + POINT_ROWS * len(sizes.preview)
-
-
-@register_jitable(**INLINE)
-def nearest_row(sizes: Sizes) -> int:
-    """First row of the nearest obstacles."""
-    return situation_row(sizes) + SITUATION_ROWS
-
-
-@register_jitable(**INLINE)
-def observation_row(sizes: Sizes) -> int:
-    """First row of the observation."""
-    return nearest_row(sizes) + NEIGHBOUR_ROWS * len(sizes.nearest)
-
-
-@register_jitable(**INLINE)
-def report_row(sizes: Sizes) -> int:
-    """First row of the report."""
-    points = POINT_ROWS * len(sizes.preview) + NEIGHBOUR_ROWS * len(sizes.nearest)
-    return observation_row(sizes) + 13 + 4 * len(sizes.casters) + points
-
-
-@register_jitable(**INLINE)
-def desk_rows(sizes: Sizes) -> int:
-    """Rows of a desk."""
-    return report_row(sizes) + FIXED_REPORT_ROWS + 2 * len(sizes.casters) + len(sizes.slipping)
+@overload(as_many, jit_options=INLINE, strict=False)
+def _as_many(numbers: Any, items: Any) -> Any:
+    as_many(numbers, items)
+    return lambda numbers, items: numbers

@@ -15,15 +15,14 @@ from numba.extending import overload, register_jitable
 from caster_gym.engines.native.compiler import INLINE, borrowed, teach
 from caster_gym.engines.native.lanes import counting
 from caster_gym.engines.native.outside_sources import is_own, note_outside
-from caster_gym.envs import tracking
-from caster_gym.envs.tracking import Moment, Reference, any_of, mean_effort, tracking_errors, unless
+from caster_gym.envs import observation, report, tracking
+from caster_gym.envs.tracking import Moment, mean_effort, tracking_errors, unless
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import each
+from caster_gym.mechanics.scalars import each, greatest
 
-REFERENCE_ROWS = len(Reference._fields)
-POINT_ROWS = 7
-
+teach(report)
 teach(tracking)
+teach(observation, observation.observe)
 
 
 class TaskCode(NamedTuple):
@@ -92,13 +91,13 @@ def weights_of(guide: Any) -> Any:
     return _BY_SOURCE[type(guide)].weights(*guide.weights)
 
 
-def judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
+def evaluate(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
     """Errors, endings, and the reward's terms."""
     code = _BY_WEIGHTS[type(weights)]
-    return evaluated(state, reference, torques, record, situation, robot, weights, code.endings, code.reward)
+    return evaluate_by(state, reference, torques, record, situation, robot, weights, code.endings, code.reward)
 
 
-def evaluated(
+def evaluate_by(
     state: Any,
     reference: Any,
     torques: Any,
@@ -113,10 +112,10 @@ def evaluated(
     errors = tracking_errors(state, reference)
     moment = Moment(state, reference, errors, mean_effort(torques, robot), record, situation)
     ended = endings(moment, weights)
-    return errors, ended, each(unless, (any_of(ended),), reward(moment, weights)[:])
+    return errors, ended, each(unless, (greatest(ended),), reward(moment, weights)[:])
 
 
-register_jitable(**INLINE)(evaluated)
+register_jitable(**INLINE)(evaluate_by)
 
 
 @register_jitable(**INLINE)
@@ -156,10 +155,10 @@ def _weights_of(guide: Any) -> Any:
     return lambda guide: weights(*each(_entry, (guide.weights,), counting(like)))
 
 
-@overload(judge, jit_options=INLINE, strict=False)
-def _judge(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
+@overload(evaluate, jit_options=INLINE, strict=False)
+def _evaluate(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
     code = _BY_WEIGHTS[weights.instance_class]
     endings, reward = code.endings, code.reward
-    return lambda state, reference, torques, record, situation, robot, weights: evaluated(
+    return lambda state, reference, torques, record, situation, robot, weights: evaluate_by(
         state, reference, torques, record, situation, robot, weights, endings, reward
     )

@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 
 from caster_gym.engines.native.compiler import INLINE
 from caster_gym.engines.native.lanes import read, read_robot, read_slip_state, read_state, write
-from caster_gym.envs.native.layout import Sizes, friction_row, parameter_row, slip_row
+from caster_gym.envs.native.layout import Sizes, rows_of
 from caster_gym.mechanics.floor import FloorTable, Surface, own_friction, patch_friction
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import slip_speeds
@@ -19,71 +19,71 @@ from caster_gym.mechanics.slip_state import rolling_state
 
 
 @register_jitable(**INLINE)
-def state_of(desk: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
+def state_of(workspace: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
     """State of one robot; one whose wheels may slip has rates of its own for each caster."""
-    return either(floor, read_state, _slip_state, (desk, lane, 0, sizes.casters))
+    return either(floor, read_state, _slip_state, (workspace, lane, 0, sizes.casters))
 
 
 @register_jitable(**INLINE)
-def _slip_state(_floor: FloorTable, desk: Any, lane: Any, row: Any, casters: Any) -> State:
-    return read_slip_state(desk, lane, row, casters)
+def _slip_state(_floor: FloorTable, workspace: Any, lane: Any, row: Any, casters: Any) -> State:
+    return read_slip_state(workspace, lane, row, casters)
 
 
 @register_jitable(**INLINE)
-def begun(desk: Any, lane: Any, state: State, floor: Any, sizes: Sizes) -> Any:
+def begun(workspace: Any, lane: Any, state: State, floor: Any, sizes: Sizes) -> Any:
     """The numbers of a state in which no wheel slips."""
-    return either(floor, _rolling, _rolling_wheels, (desk, lane, state, sizes))
+    return either(floor, _rolling, _rolling_wheels, (workspace, lane, state, sizes))
 
 
 @register_jitable(**INLINE)
-def _rolling(_desk: Any, _lane: Any, state: State, _sizes: Sizes) -> Any:
+def _rolling(_workspace: Any, _lane: Any, state: State, _sizes: Sizes) -> Any:
     return pack_state(state)
 
 
 @register_jitable(**INLINE)
-def _rolling_wheels(_floor: FloorTable, desk: Any, lane: Any, state: State, sizes: Sizes) -> Any:
-    return pack_state(rolling_state(state, read_robot(desk, lane, parameter_row(sizes), sizes.casters)))
+def _rolling_wheels(_floor: FloorTable, workspace: Any, lane: Any, state: State, sizes: Sizes) -> Any:
+    return pack_state(rolling_state(state, read_robot(workspace, lane, rows_of(sizes).parameters, sizes.casters)))
 
 
 @register_jitable(**INLINE)
-def surface_of(desk: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
+def surface_of(workspace: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
     """The floor under one robot, once `feel_floor` has looked it up; None if it grips."""
-    return either(floor, _grip, _finite_friction, (desk, lane, sizes))
+    return either(floor, _grip, _finite_friction, (workspace, lane, sizes))
 
 
 @register_jitable(**INLINE)
-def _grip(_desk: Any, _lane: Any, _sizes: Sizes) -> None:
+def _grip(_workspace: Any, _lane: Any, _sizes: Sizes) -> None:
     return
 
 
 @register_jitable(**INLINE)
-def _finite_friction(floor: FloorTable, desk: Any, lane: Any, sizes: Sizes) -> Surface:
-    return Surface(read(desk, lane, friction_row(sizes), sizes.casters), floor.contact_time)
+def _finite_friction(floor: FloorTable, workspace: Any, lane: Any, sizes: Sizes) -> Surface:
+    return Surface(read(workspace, lane, rows_of(sizes).friction, sizes.casters), floor.contact_time)
 
 
 @register_jitable(**INLINE)
-def slips_of(desk: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
+def slips_of(workspace: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
     """Greatest slip of each wheel in the control period [m/s]; empty where none may slip."""
-    return either(floor, _no_slips, _greatest_slips, (desk, lane, sizes))
+    return either(floor, _no_slips, _greatest_slips, (workspace, lane, sizes))
 
 
 @register_jitable(**INLINE)
-def _no_slips(_desk: Any, _lane: Any, _sizes: Sizes) -> Any:
+def _no_slips(_workspace: Any, _lane: Any, _sizes: Sizes) -> Any:
     return ()
 
 
 @register_jitable(**INLINE)
-def _greatest_slips(_floor: FloorTable, desk: Any, lane: Any, sizes: Sizes) -> Any:
-    return read(desk, lane, slip_row(sizes), sizes.casters)
+def _greatest_slips(_floor: FloorTable, workspace: Any, lane: Any, sizes: Sizes) -> Any:
+    return read(workspace, lane, rows_of(sizes).slips, sizes.casters)
 
 
 @register_jitable(**INLINE)
-def note_slips(desk: Any, lane: Any, went: Any, end: State, robot: Any, floor: Any, sizes: Sizes) -> None:
+def note_slips(workspace: Any, lane: Any, went: Any, end: State, robot: Any, floor: Any, sizes: Sizes) -> None:
     """Keep the greatest slip of each wheel; went: 1 if the robot has made a step to that end, else 0."""
     if floor is None:
         return
-    slips, row = each(_counted, (went,), slip_speeds(end, robot)), slip_row(sizes)
-    write(desk, lane, row, each(maximum, (), slips, read(desk, lane, row, sizes.casters)))
+    slips, row = each(_counted, (went,), slip_speeds(end, robot)), rows_of(sizes).slips
+    write(workspace, lane, row, each(maximum, (), slips, read(workspace, lane, row, sizes.casters)))
 
 
 @register_jitable(**INLINE)
@@ -92,18 +92,18 @@ def _counted(went: Any, slip: Any) -> Any:
 
 
 @register_jitable(**INLINE)
-def feel_floor(desk: Any, lanes: Any, floor: Any, sizes: Sizes) -> None:
+def feel_floor(workspace: Any, lanes: Any, floor: Any, sizes: Sizes) -> None:
     """Look up the floor's friction under each wheel, patch by patch, so that the loops over lanes stay SIMD."""
     if floor is None:
         return
-    row = friction_row(sizes)
+    row = rows_of(sizes).friction
     for lane in range(lanes):
-        robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
-        write(desk, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
+        robot = read_robot(workspace, lane, rows_of(sizes).parameters, sizes.casters)
+        write(workspace, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
     for k in range(len(floor.patches)):
         patch = floor.patches[k, 0], floor.patches[k, 1], floor.patches[k, 2], floor.patches[k, 3]
         for lane in range(lanes):
-            state = read_state(desk, lane, 0, sizes.casters)
-            robot = read_robot(desk, lane, parameter_row(sizes), sizes.casters)
-            before, shared = read(desk, lane, row, sizes.casters), (state.position, state.heading, patch)
-            write(desk, lane, row, each(patch_friction, shared, before, state.directions, robot.casters))
+            state = read_state(workspace, lane, 0, sizes.casters)
+            robot = read_robot(workspace, lane, rows_of(sizes).parameters, sizes.casters)
+            before, shared = read(workspace, lane, row, sizes.casters), (state.position, state.heading, patch)
+            write(workspace, lane, row, each(patch_friction, shared, before, state.directions, robot.casters))

@@ -15,8 +15,9 @@ from torch import Tensor
 from torch.utils import _pytree as pytree
 
 from caster_gym.engines.tensor.motion import surface_below
+from caster_gym.envs.observation import GAP_LIMIT, Neighbour
 from caster_gym.envs.plan import Plan
-from caster_gym.envs.tracking import GAP_LIMIT, Neighbour, Record, record_of
+from caster_gym.envs.report import RECORD, Record, record_of
 from caster_gym.mechanics.floor import FloorTable
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters
@@ -114,16 +115,16 @@ class TorchSurroundings:
         """Gap to the nearest obstacle, infinite without one [m], and the `count` nearest ones in order."""
         obstacles, none = self.beside(paths), torch.zeros_like(state.position[0])
         nearest = none + torch.inf
-        neighbours: list[Neighbour] = [(none + GAP_LIMIT, none, none)] * count
+        neighbours = [Neighbour(none + GAP_LIMIT, none, none)] * count
         for k, there in enumerate(self._there):
             apart = separation(state.position, state.heading, self.hull, obstacles, k)
             gap = torch.where(there[paths], apart.gap, torch.inf)
             nearest = torch.minimum(gap, nearest)
-            moving: Neighbour = (gap, apart.nx, apart.ny)
+            moving = Neighbour(gap, apart.nx, apart.ny)
             for j, place in enumerate(neighbours):
                 nearer = moving[0] < place[0]
-                neighbours[j] = each(where, (nearer,), moving, place)
-                moving = each(where, (nearer,), place, moving)
+                neighbours[j] = Neighbour(*each(where, (nearer,), moving, place))
+                moving = Neighbour(*each(where, (nearer,), place, moving))
         return nearest, tuple(neighbours)
 
     def careful_step(
@@ -154,7 +155,7 @@ class TorchSurroundings:
         end, drive, touch = guarded_driven_step(
             state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans), surface
         )
-        end_of_record = n + len(Record._fields)
+        end_of_record = n + len(RECORD)
         happened = record_of(Record(*record[n:end_of_record, near].unbind(0)), drive, touch, share)
         slips = list(record[end_of_record:, near].unbind(0))
         if floor is not None:

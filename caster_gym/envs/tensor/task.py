@@ -21,29 +21,30 @@ from caster_gym.engines.tensor.scalars import check_memory, checked_device, chec
 from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike
 from caster_gym.envs.native import layout
 from caster_gym.envs.native.engine import DRAW_A_PATH
-from caster_gym.envs.native.reference import evaluated
+from caster_gym.envs.native.reference import evaluate_by
+from caster_gym.envs.observation import GAP_LIMIT, Neighbour, View, observe
+from caster_gym.envs.report import (
+    RECORD,
+    REPORT,
+    Deviation,
+    Pose,
+    Record,
+    Report,
+    Situation,
+    flat_report,
+    sum_of,
+)
+from caster_gym.envs.rows import check_names, span
 from caster_gym.envs.starts import DRAWN, Start, check_free, check_longest, check_motion, check_place, nearest_row
 from caster_gym.envs.tensor.obstacles import Given, torch_surroundings
 from caster_gym.envs.tensor.randomness import episode_seed, uniform
 from caster_gym.envs.tensor.reference import TorchSource, torch_weights
-from caster_gym.envs.tracking import (
-    ASKS,
-    GAP_LIMIT,
-    Neighbour,
-    Record,
-    Report,
-    Situation,
-    distance_square,
-    flat_report,
-    observe,
-    report,
-    start,
-)
+from caster_gym.envs.tracking import distance_square, report, start
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.mechanics.room import step_within_room
-from caster_gym.mechanics.scalars import Direction, Scalar, each, pairs, sqrt, total
+from caster_gym.mechanics.scalars import Direction, Scalar, pairs, sqrt
 from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 from caster_gym.paths.specification import PathLike
 
@@ -52,6 +53,10 @@ if TYPE_CHECKING:
 
 DIAGNOSTICS = ("traction_use", "wheels_lifted", "conditioning")
 _BEFORE = -1.0  # [m] progress of an episode that is about to start
+
+
+_ASKED = span((RECORD.traction, RECORD.lifted))
+check_names(Record._fields[:1], "the first field of Record", ("power",), "that which motors give beside torques")
 
 
 class TaskState(NamedTuple):
@@ -146,7 +151,7 @@ class TorchTask:
         self._reward, self._endings = definition.reward, definition.endings
         self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
         self._floor = None if self.task.slippery is None else torch_floor(self.task.slippery)
-        self._slipping = self.engine.slipping
+        self._slipping, self._terms = self.engine.slipping, self.engine.plan.terms
         # plain numbers, since what is reached through other objects is looked up anew before each compiled call
         self._joints, self._substeps, self._h = 2 * self.robot.caster_count, self.task.substeps, self.task.time_step
         self._start_offset, self._start_turn = self.task.start_offset, self.task.start_turn
@@ -188,7 +193,7 @@ class TorchTask:
         start: where it is given, of all robots; see `caster_gym.envs.starts.read_start`.
         """
         count = len(keys)
-        rows = 3 * self.layout.size + 2 * (layout.FIXED_REPORT_ROWS + 4 * self.robot.caster_count)
+        rows = 3 * self.layout.size + 2 * self.engine.report_rows
         check_memory(count, rows, self.dtype, self.device)
         whole = torch.zeros(count, dtype=torch.int64, device=self.device)
         none = self._empty(layout.state_rows(self.robot.caster_count, self._floor is not None), count)
@@ -260,7 +265,7 @@ class TorchTask:
     @property
     def _record_rows(self) -> int:
         """Mean motor torques, then what a Record holds, and the slips of wheels that may slip."""
-        return 2 * self.robot.caster_count + layout.RECORD_ROWS + self._slipping
+        return 2 * self.robot.caster_count + len(RECORD) + self._slipping
 
     def _empty(self, rows: int, count: int) -> Tensor:
         return torch.zeros((rows, count), dtype=self.dtype, device=self.device)
@@ -283,7 +288,7 @@ class TorchTask:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """States, records and rooms after RK4 steps; who may touch something stays, with a negative room."""
         n = self._joints
-        around, asked = self._around, slice(n + ASKS, n + ASKS + 2)
+        around, asked = self._around, slice(n + _ASKED.start, n + _ASKED.stop)
         for _ in range(steps):
             target, done, asks, slips = self._stepped(bodies, given)
             share: Scalar = 1.0 / self._substeps
@@ -296,10 +301,10 @@ class TorchTask:
                 share, asks = share * went, went * asks
                 slips = None if slips is None else went * slips
             asks = torch.maximum(asks, record[asked])
-            kept = record[asked.stop : n + layout.RECORD_ROWS]
+            kept = record[asked.stop : n + len(RECORD)]
             rows = [record[: n + 1] + share * done, record[n + 1 : asked.start], asks, kept]
             if slips is not None:
-                rows.append(torch.maximum(slips, record[n + layout.RECORD_ROWS :]))
+                rows.append(torch.maximum(slips, record[n + len(RECORD) :]))
             record = torch.cat(rows)
         return bodies, record, room
 
@@ -331,40 +336,37 @@ class TorchTask:
         guide: another one than the task's.
         """
         state, n = self._state(bodies), self._joints
-        end = n + layout.RECORD_ROWS
+        end = n + len(RECORD)
         torques, done, slips = pairs(record[:n].unbind(0)), Record(*record[n:end].unbind(0)), record[end:].unbind(0)
         guide = self._guide if guide is None else guide
         guidance = guide.fetch(state, clocks, paths, before)
         reference = guidance.reference
         gap, nearest = self._look_around(state, paths)
         situation = Situation(guidance.progress, guidance.share, gap)
-        errors, ended, terms = evaluated(
+        errors, endings, terms = evaluate_by(
             state, reference, torques, done, situation, robot, self._weights, self._endings, self._reward
         )
         if self.diagnostics:
-            whole = report(state, reference, errors, done, situation, ended, terms, robot)
+            reported = report(state, reference, errors, done, situation, endings, robot)
         else:
-            pose, wanted = state.position + state.heading, (reference.x, reference.y, reference.cos, reference.sin)
-            distance = sqrt(distance_square(errors))
-            whole = Report(
-                ended, distance, errors.sin, errors.cos, torch.zeros_like(gap), terms, pose, wanted, done, situation
-            )
-        told = list(flat_report(whole, torques, slips))
-        told[layout.HEADING_SIN] = torch.atan2(errors.sin, errors.cos)
+            pose, wanted = Pose(*state.position, *state.heading), Pose(*reference[: len(Pose._fields)])
+            deviation = Deviation(sqrt(distance_square(errors)), errors.sin, errors.cos, torch.zeros_like(gap))
+            reported = Report(endings, deviation, pose, wanted, done, situation)
+        numbers = list(flat_report(reported, layout.as_many(terms, self._terms), torques, slips))
+        numbers[REPORT.deviation.heading_sin] = torch.atan2(errors.sin, errors.cos)
         rates = all_joint_rates(state, robot, self._floor)
-        seen = observe(state, reference, errors, guidance.preview, nearest, rates, robot)
-        (rewards,) = total(each(_alone, (), terms))
-        (failed,) = total(each(_alone, (), ended))
+        seen = observe(View(state, reference, errors, guidance.preview, nearest, rates, robot))
         truncated = clocks >= guide.spans[paths, 2]
-        numbers = torch.stack([number.to(self.dtype) for number in told])
-        return TaskOutcome(torch.stack(seen).T, rewards, failed > 0.0, truncated, numbers), guidance.progress, gap
+        rows = torch.stack([number.to(self.dtype) for number in numbers])
+        outcome = TaskOutcome(torch.stack(seen).T, sum_of(terms), sum_of(endings) > 0.0, truncated, rows)
+        return outcome, guidance.progress, gap
 
     def _look_around(self, state: State, paths: Tensor) -> tuple[Tensor, tuple[Neighbour, ...]]:
         """Gap to the nearest obstacle [m], and the obstacles that the observation shows."""
         if self._around is not None:
             return self._around.look(state, paths, self._nearest)
         none = torch.zeros_like(state.position[0])
-        return none + math.inf, ((none + GAP_LIMIT, none, none),) * self._nearest
+        return none + math.inf, (Neighbour(none + GAP_LIMIT, none, none),) * self._nearest
 
     def _start(self, state: TaskState, wanted: Tensor, given: Start, checked: Tensor) -> tuple[TaskState, TaskOutcome]:
         """Everybody at the start of the next episode, on the wanted path or, where it is negative, a drawn one.
@@ -471,7 +473,3 @@ class TorchTask:
 
     def _direction(self, angle: Tensor) -> Direction:
         return torch.cos(angle).to(self.dtype), torch.sin(angle).to(self.dtype)
-
-
-def _alone(number: Scalar) -> tuple[Scalar]:
-    return (number,)

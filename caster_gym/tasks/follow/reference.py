@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.engines.native.lanes import write
-from caster_gym.envs.native.reference import POINT_ROWS, REFERENCE_ROWS
 from caster_gym.envs.plan import PlaceName, Plan, joined
-from caster_gym.envs.tracking import Reference
+from caster_gym.envs.tracking import POINT_ROWS, REFERENCE_ROWS, Reference
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.scalars import minimum
 from caster_gym.paths.specification import AnyPath
@@ -150,11 +149,9 @@ def fetch(block: Any, lane: Any, row: Any, state: State, _clock: Any, path: Any,
     length = (source.spans[path, 1] - source.spans[path, 0]) * source.spacings[path]
     progress = 0.0 if before < 0.0 else _nearest(state.position, path, before, source)
     reference = _reference_at(path, progress, state, source)
-    r = reference
-    write(block, lane, row, (r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega, r.ax, r.ay, r.alpha))
+    write(block, lane, row, reference[:])
     for p in range(len(source.horizons)):
-        r = _reference_at(path, minimum(progress + source.horizons[p], length), state, source)
-        point = (r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega)
-        write(block, lane, row + REFERENCE_ROWS + p * POINT_ROWS, point)
+        coming = _reference_at(path, minimum(progress + source.horizons[p], length), state, source)
+        write(block, lane, row + REFERENCE_ROWS + p * POINT_ROWS, coming[:POINT_ROWS])
     last = _row(source.samples, source.spans[path, 1])
     return progress, progress_share(progress, before, length, state.position, last, source)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from caster_gym.envs.tensor.reference import Guidance
-from caster_gym.envs.tracking import Reference
+from caster_gym.envs.tracking import POINT_ROWS, Point, Reference
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.scalars import each, maximum, minimum, where
 from caster_gym.tasks.follow.course import Row, at_rest, chord_share, course_reference, nearest_share, progress_share
@@ -33,8 +33,8 @@ class TorchCourses:
         reference = self.reference_at(path, progress, state)
         preview = []
         for ahead in self._horizons:
-            r = self.reference_at(path, torch.minimum(progress + ahead, length), state)
-            preview.append((r.x, r.y, r.cos, r.sin, r.vx, r.vy, r.omega))
+            coming = self.reference_at(path, torch.minimum(progress + ahead, length), state)
+            preview.append(Point(*coming[:POINT_ROWS]))
         last = self._row(self.spans[path, 1])
         share = progress_share(progress, before, length, state.position, last, source)
         return Guidance(reference, tuple(preview), progress, share)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from caster_gym.engines.native.lanes import LANES
-from caster_gym.envs.native.reference import POINT_ROWS, REFERENCE_ROWS
 from caster_gym.envs.plan import PlaceName, joined
+from caster_gym.envs.tracking import POINT_ROWS, REFERENCE_ROWS
 from caster_gym.mechanics.integration import State
 from caster_gym.paths.specification import AnyPath, build_trajectories
 from caster_gym.robot import Robot

@@ -1,13 +1,10 @@
 """Trajectories run by the clock, for a batch of tensors."""
 
-from typing import cast
-
 import torch
 from torch import Tensor
 
-from caster_gym.envs.native.reference import POINT_ROWS
 from caster_gym.envs.tensor.reference import Guidance
-from caster_gym.envs.tracking import Point, Reference
+from caster_gym.envs.tracking import POINT_ROWS, Point, Reference
 from caster_gym.mechanics.integration import State
 from caster_gym.tasks.track.reference import Timetable
 
@@ -31,4 +28,4 @@ class TorchTimetable:
         reference = self.reference_at(path, clock, state)
         rows = [self.samples[:POINT_ROWS, torch.minimum(first + clock + ahead, last)] for ahead in self._horizons]
         none = torch.zeros_like(before)
-        return Guidance(reference, tuple(cast(Point, row.unbind(0)) for row in rows), none, none)
+        return Guidance(reference, tuple(Point(*row.unbind(0)) for row in rows), none, none)
