@@ -234,7 +234,10 @@ def test_plain_python_gives_what_the_compiled_code_delivers(moments):
         record = untouched(m.info["power"])
         situation = Situation(0.0, 0.0, np.inf)
         effort = tracking.mean_effort(torques, parameters)
-        moment, weights = tracking.Moment(state, reference, errors, effort, record, situation), weights_of(TASK)
+        moment, weights = (
+            tracking.Moment(state, reference, errors, effort, record, situation),
+            weights_of(TASK, corridor=m.env.task.corridor),
+        )
         ended, terms = tracking.endings(moment, weights), TASK.reward(moment, weights)
         assert terms._asdict() == m.info["reward_terms"]
         report = tracking.report(state, reference, errors, record, situation, ended, parameters)
