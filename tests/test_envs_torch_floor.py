@@ -22,7 +22,7 @@ def test_episodes_are_those_of_the_compiled_batch(task):
 def test_episodes_among_obstacles_are_those_of_the_compiled_batch():
     """Pillars and walls beside two paths: impacts in which wheels slip, and lasting contacts."""
     floor = {"friction": 0.4}
-    *_, impacts = assert_same_episodes(*both("track", 4, arena=OBSTACLES, corridor=0.6, floor=floor), 8, 1.5)
+    *_, impacts = assert_same_episodes(*both("follow", 4, arena=OBSTACLES, corridor=0.6, floor=floor), 8, 1.5)
     assert impacts >= 1
 
 
