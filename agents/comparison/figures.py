@@ -110,7 +110,7 @@ def draw_path(
         axis.plot(driven[:, 0], driven[:, 1], color=colours[agent], linewidth=1.2, label=agent)
     axis.plot(*table[0, :2], "o", color="black", markersize=5)
     low, high = table[:, :2].min(axis=0), table[:, :2].max(axis=0)
-    centre, reach = 0.5 * (low + high), 0.15 + 0.6 * float((high - low).max())
+    centre, reach = 0.5 * (low + high), pictures.around + 0.6 * float((high - low).max())
     axis.set_xlim(centre[0] - reach, centre[0] + reach)
     axis.set_ylim(centre[1] - reach, centre[1] + reach)
     axis.set_aspect("equal")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 TASKS = {
     "track": "caster_gym.tasks.track:TASK",
     "follow": "caster_gym.tasks.follow:TASK",
+    "hold": "caster_gym.tasks.hold:TASK",
 }
 
 

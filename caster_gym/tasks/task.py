@@ -35,6 +35,7 @@ class Pictures(NamedTuple):
 
     path: str = "path"  # what the line that is to be driven is called
     magnified: float = 1.0  # how much larger errors are drawn beside it
+    around: float = 0.15  # [m] that is shown on all sides of it, at least
     speeds: bool = False  # whether the speed along the path is shown, beside that of the time law in its last column
 
 

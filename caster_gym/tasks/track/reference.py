@@ -28,7 +28,7 @@ class Timetable(NamedTuple):
     weights: Any = np.zeros(0)  # float64 (weights,), as in TrackWeights
 
     @property
-    def place(self) -> PlaceName:
+    def place(self) -> PlaceName | None:
         """Of starts."""
         return "time"
 
