@@ -1,5 +1,6 @@
 """Typed settings of tasks; the YAML files in configs/tasks hold what differs from the defaults."""
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
@@ -15,7 +16,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from caster_gym.arena.arena import Arena, read_arena
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import FOLDER, Frozen
 from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
@@ -70,9 +71,12 @@ class ChosenTask(Frozen):
 
     @field_validator("environment")
     @classmethod
-    def _is_a_task(cls, environment: str) -> str:
+    def _is_a_task(cls, environment: str, info: ValidationInfo) -> str:
         if environment not in TASKS and ":" not in environment:
             raise PydanticCustomError("misread", "should be {kind}", {"kind": KNOWN})
+        if ":" in environment:  # beside the file in which it stands, or where the command runs
+            folder = (info.context or {}).get(FOLDER) or Path.cwd()
+            sys.path += [place for place in (str(Path(folder).absolute()), str(Path.cwd())) if place not in sys.path]
         find_task(environment)
         return environment
 
