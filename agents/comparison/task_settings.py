@@ -16,8 +16,8 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from caster_gym.arena.arena import Arena, read_arena
-from caster_gym.configuration import FOLDER, Frozen
-from caster_gym.file_names import NameOrFile, beside_its_file, is_file_name, with_files_beside
+from caster_gym.configuration import Frozen
+from caster_gym.file_names import FOLDER, NameOrFile, beside_its_file, is_file_name, with_files_beside
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.specification import PathSpecification
 from caster_gym.robot import Robot, load_robot
