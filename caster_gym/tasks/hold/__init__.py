@@ -22,5 +22,5 @@ TASK = Task(
     terms=HoldTerms,
     reward=reward,
     metrics=METRICS,
-    pictures=Pictures(path="pose to hold", around=0.7),
+    pictures=Pictures(path="pose to hold", around=0.4),
 )
