@@ -1,17 +1,23 @@
 """CONTRIBUTING.md: its recipes give what they promise."""
 
+import os
 import re
+import shutil
+import subprocess
+import sys
 import textwrap
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 import caster_gym
 from caster_gym.arena import arena, distances
 
-TEXT = (Path(__file__).resolve().parent.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).resolve().parent.parent
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def recipe(title, language):
@@ -45,3 +51,98 @@ def test_the_new_kind_of_obstacle_is_where_it_says():
     gaps, _ = distances(Yard(), robot, [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [3.0, 2.0, 0.0]])
     by_hand = np.array([1.0, 1.0, np.hypot(2.0, 1.0)]) - 0.2 - 0.15  # to the side, beyond the end, from the corner
     assert_allclose(gaps[:, 0], by_hand, rtol=1e-12)  # rounding
+
+
+def change(root, title):
+    """Change a copy of the package as a section says; each piece of a change has a place of its own in the file."""
+    name, *pieces = recipe(title, "diff").removeprefix("--- ").split("\n@@\n")
+    text = (root / name).read_text(encoding="utf-8")
+    for piece in pieces:
+        lines = piece.splitlines()
+        before, after = ("\n".join(line[1:] for line in lines if line[:1] not in left_out) for left_out in "+-")
+        assert text.count(before + "\n") == 1, before
+        text = text.replace(before, after)
+    (root / name).write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def copied(tmp_path):
+    """A copy of the package, to be changed."""
+    for name in ("caster_gym", "agents", "configs"):
+        shutil.copytree(ROOT / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def run_in(root, program):
+    """What a program says that imports the package from there."""
+    environment = os.environ | {"PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(root / "cache")}
+    command = [sys.executable, "-c", textwrap.dedent(program)]
+    return subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_a_new_reward_term_and_a_new_channel_shift_nothing(copied):
+    """One robot, a batch and tensors agree; rewards are sums of all terms, and the rest is what it was."""
+    program = """
+        import gymnasium as gym, numpy as np, torch
+        from numpy.testing import assert_allclose, assert_array_equal
+        import caster_gym
+        from caster_gym.tasks.track import TASK
+
+        settings = dict(path={"shape": "circle", "radius": 0.3, "duration": 8.0}, preview=(0.1,), start_offset=0.0)
+        single = gym.make("caster_gym:CasterTrack-v0", **settings).unwrapped
+        batch = gym.make_vec("caster_gym:CasterTrack-v0", num_envs=2, **settings)
+        tensors = caster_gym.TorchVectorEnv("track", 2, dtype=torch.float64, **settings)
+        for env in (single, batch, tensors):
+            env.reset(seed=4)
+        actions = np.full((2, 6), 0.2, dtype=np.float32)
+        for _ in range(3):
+            one, many, there = single.step(actions[0]), batch.step(actions), tensors.step(torch.as_tensor(actions))
+
+        observation, reward, *_, info = one
+        assert tuple(info["reward_terms"]) == TASK.terms._fields and "power" in TASK.terms._fields
+        assert reward == sum(info["reward_terms"].values())
+        assert info["power"] > 0.0 and info["reward_terms"]["power"] == -0.001 * info["power"]
+        assert_array_equal(info["pose"], single.engine.states[0][:4])
+        assert_array_equal(info["reference_pose"], single.engine.plan.tables[0][3][:4])
+        assert_allclose(info["torque"], [0.04, 0.02] * 3, rtol=1e-6)  # float32 shares of 0.2 and 0.1 N m
+        assert (info["clearance"], info["impacts"], info["touched"]) == (np.inf, 0.0, False)
+
+        layout = single.engine.layout
+        assert layout.size == observation.size == single.observation_space.shape[0]
+        error, twist, wanted = (layout.physical(observation, n) for n in ("twist_error", "twist", "reference_twist"))
+        assert_allclose(wanted, twist + error, atol=1e-6)  # float32 of order 1
+        assert_allclose(twist, single.engine.states[0][4:7], rtol=1e-6)
+        directions = layout.physical(observation, "directions").reshape(-1, 2)
+        assert_allclose(np.hypot(*directions.T), 1.0, rtol=1e-6)
+        assert_allclose(np.hypot(*layout.physical(observation, "preview_0.1s")[2:4]), 1.0, rtol=1e-6)
+
+        def numbers(of, robot):
+            flat = {**of, **of["reward_terms"]}
+            del flat["reward_terms"]
+            return {k: np.asarray(v if robot is None else v[robot]) for k, v in flat.items() if k[0] != "_"}
+
+        assert_array_equal(many[0][0], observation)
+        assert many[1][0] == reward
+        assert_allclose(there[0][0], observation, atol=1e-6)  # float64 against float32
+        assert_allclose(float(there[1][0]), reward, atol=1e-12)  # rounding in another order
+        there[4].pop("final_obs"), there[4].pop("final_info")
+        for name, value in numbers(info, None).items():
+            assert_array_equal(numbers(many[4], 0)[name], value, err_msg=name)
+            assert_allclose(numbers(there[4], 0)[name], value, atol=1e-9, err_msg=name)
+    """
+    change(copied, "Add a reward term")
+    change(copied, "Add an observation channel")
+    done = run_in(copied, program)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_channel_of_another_width_than_its_units_is_refused_at_import(copied):
+    change(copied, "Add an observation channel")
+    file = copied / "caster_gym/envs/observation.py"
+    text = file.read_text(encoding="utf-8")
+    assert text.count("vx, vy, view.reference.omega") == 1
+    file.write_text(text.replace("vx, vy, view.reference.omega", "vx, vy"), encoding="utf-8")
+    said = run_in(copied, "import caster_gym.envs.observation").stderr
+    assert "channel 'reference_twist' of the observation has 3 units, and its function" in said
+    assert "reference_twist gives 2 numbers" in said

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from caster_gym.envs.observation import ObservationLayout
+from caster_gym.envs.observation import GAP_UNIT, Neighbour, ObservationLayout, observation_size
 from tests.random_robots import random_robot
 
 
@@ -17,7 +17,7 @@ def test_parts_of_the_observation_fill_it_without_gap(caster_count, preview):
         assert part.place.start == ends[-1]
         assert len(part.scale) == part.place.stop - part.place.start
         ends.append(part.place.stop)
-    assert ends[-1] == layout.size == 13 + 4 * caster_count + 7 * len(preview)
+    assert ends[-1] == layout.size == observation_size(caster_count, len(preview), 0)
     assert len(layout.table().splitlines()) == 2 + len(layout.parts)
     assert all(part.name in layout.table() for part in layout.parts)
 
@@ -25,9 +25,9 @@ def test_parts_of_the_observation_fill_it_without_gap(caster_count, preview):
 def test_nearest_obstacles_come_last_in_the_observation():
     robot = random_robot(303, 3)
     without, layout = ObservationLayout(robot, (0.1,)), ObservationLayout(robot, (0.1,), "m", 2)
-    assert layout.size == without.size + 2 * 3
+    assert layout.size == without.size + 2 * len(Neighbour._fields)
     assert [part.name for part in layout.parts][-3:] == ["preview_0.1m", "obstacle_1", "obstacle_2"]
-    assert_array_equal(layout.physical(np.ones(layout.size), "obstacle_2"), [0.25, 1.0, 1.0])
+    assert_array_equal(layout.physical(np.ones(layout.size), "obstacle_2"), [GAP_UNIT, 1.0, 1.0])
 
 
 def test_a_batch_of_observations_is_decoded_along_its_last_axis():

@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from caster_gym.engines.native.lanes import LANES
+from caster_gym.envs.observation import observation_size
 from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.tasks.follow.parameters import FollowParameters
 from tests.test_envs_vector import assert_same, random_actions
@@ -43,7 +44,7 @@ def test_gymnasium_and_sb3_find_nothing_to_complain_about(arena):
 def test_spaces_are_those_of_the_docstring():
     """13 numbers, four per caster, seven per previewed point, three per obstacle; a torque per driven joint."""
     env = CasterFollowEnv()
-    assert env.observation_space.shape == (13 + 4 * 3 + 7 * 3 + 3 * 3,)
+    assert env.observation_space.shape == (observation_size(3, 3, 3),)
     assert (env.observation_space.low == -20.0).all() and (env.observation_space.high == 20.0).all()
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (6,), np.float32)
     names = [part.name for part in env.engine.layout.parts]

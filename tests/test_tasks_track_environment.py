@@ -1,5 +1,6 @@
 """caster_gym.tasks.track.environment, .parameters: the single one as its users meet it."""
 
+import re
 import warnings
 
 import gymnasium as gym
@@ -11,6 +12,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.actuation import ActuationWarning
+from caster_gym.envs.observation import observation_size
 from caster_gym.tasks.building import build_engine
 from caster_gym.tasks.track import TASK
 from caster_gym.tasks.track.environment import CasterTrackEnv
@@ -258,7 +260,7 @@ def test_a_task_without_spread_starts_on_the_trajectory():
 
 def test_a_task_without_preview_works():
     env = CasterTrackEnv(preview=(), **WIDE)
-    assert env.observation_space.shape == (13 + 4 * 3,)
+    assert env.observation_space.shape == (observation_size(3, 0, 0),)
     full = CasterTrackEnv(**WIDE)
     assert_array_equal(env.reset(seed=4)[0], full.reset(seed=4)[0][:25])
     assert_array_equal(env.step(rest(env))[0], full.step(rest(env))[0][:25])
@@ -337,14 +339,17 @@ def test_trajectories_are_built_once_for_all_environments_of_a_process():
 
 
 def test_the_layout_in_the_docstring_is_the_layout_of_the_engine():
-    """13 numbers, four per caster, seven per previewed point, as the table of the class says."""
-    env = CasterTrackEnv(**WIDE)
-    assert env.observation_space.shape == (13 + 4 * 3 + 7 * 3,) == (env.engine.layout.size,)
-    names = [part.name for part in env.engine.layout.parts]
-    starts = dict(zip(names, (part.place.start for part in env.engine.layout.parts), strict=True))
-    expected = {"position_error": 0, "heading_error": 2, "twist_error": 4, "twist": 7, "reference_acceleration": 10}
-    expected |= {"directions": 13, "joint_rates": 19, "preview_0.1s": 25, "preview_0.2s": 32, "preview_0.4s": 39}
-    assert starts == expected
+    """Its table counts in casters N and previewed points K."""
+    parts = {part.name: part.place for part in CasterTrackEnv(**WIDE, nearest=1).engine.layout.parts}
+    own = [place for name, place in parts.items() if place.stop <= parts["directions"].start]
+    first = own[-1].stop
+    expected = [f"{place.start}–{place.stop - 1}" for place in own]
+    expected += [f"{first} … {first - 1}+2N", f"{first}+2N … {first - 1}+4N"]
+    widths = [parts[name].stop - parts[name].start for name in ("preview_0.1s", "obstacle_1")]
+    expected += [f"then {widths[0]} for each K", f"then {widths[1]} for each of `nearest` (0)"]
+    table = CasterTrackEnv.__doc__.split("**Observation**")[1].split("**Reward**")[0]
+    indices = re.findall(r"^ *\| ([^|]+?) \|.*±", table, re.M)
+    assert indices == expected
 
 
 def test_work_of_the_motors_is_the_gain_of_energy():
