@@ -13,8 +13,10 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload, register_jitable
 
-from caster_gym.engines.native.compiler import INLINE
-from caster_gym.engines.native.lanes import BODY_ROWS
+from caster_gym.engines.native.compiler import INLINE, borrowed
+from caster_gym.engines.native.guarding import borrowed_floor, borrowed_hull, borrowed_obstacles
+from caster_gym.engines.native.lanes import BODY_ROWS, LANES
+from caster_gym.envs.native.reference import borrowed_guide
 from caster_gym.envs.observation import CHANNELS, Channel, Neighbour, observation_size, observe, observed
 from caster_gym.envs.report import RECORD, REPORT_ROWS, Situation
 from caster_gym.envs.tracking import POINT_ROWS, Reference
@@ -153,3 +155,44 @@ def as_many(numbers: tuple[Any, ...], items: tuple[Any, ...]) -> tuple[Any, ...]
 def _as_many(numbers: Any, items: Any) -> Any:
     as_many(numbers, items)
     return lambda numbers, items: numbers
+
+
+@register_jitable(**INLINE)
+def copy_rows(source: Any, target: Any, lane: Any, lanes: Any, rows: Any, first: Any) -> None:
+    """Copy the first rows of all lanes, or of one, to the rows from `first` on."""
+    if lanes == LANES:
+        for i in range(rows * LANES):
+            target[first * LANES + i] = source[i]
+    else:
+        for row in range(rows):
+            target[(first + row) * LANES + lane] = source[row * LANES + lane]
+
+
+@register_jitable(**INLINE)
+def _borrowed_arenas(arenas: Any) -> Any:
+    if arenas is None:
+        return None
+    return borrowed(arenas)
+
+
+@register_jitable(**INLINE)
+def borrowed_world(w: World) -> World:
+    return World(
+        borrowed(w.blocks),
+        borrowed(w.parameters),
+        borrowed(w.clocks),
+        borrowed(w.seeds),
+        borrowed(w.slots),
+        borrowed_guide(w.guide),
+        borrowed_hull(w.hull),
+        borrowed_obstacles(w.obstacles),
+        _borrowed_arenas(w.arenas),
+        borrowed_floor(w.floor),
+        w.substeps,
+        w.time_step,
+    )
+
+
+@register_jitable(**INLINE)
+def borrowed_views(v: Views) -> Views:
+    return Views(borrowed(v.observations), borrowed(v.reports), borrowed(v.results))
