@@ -88,9 +88,9 @@ def look(workspace: Any, first: Any, lanes: Any, guide: Any, floor: Any, sizes: 
         nearest = each(_read_neighbour, (workspace, lane, rows.nearest), counting(sizes.nearest))
         robot = read_robot(workspace, lane, rows.parameters, sizes.casters)
         errors, endings, terms = evaluate(state, reference, torques, record, situation, robot, weights)
-        reported = report(state, reference, errors, record, situation, endings, robot)
         view = View(state, reference, errors, points, nearest, all_joint_rates(state, robot, floor), robot)
         write(workspace, lane, rows.observation, observe(view))
+        reported = report(state, reference, errors, record, situation, endings, robot)
         slips = slips_of(workspace, lane, floor, sizes)
         write(workspace, lane, rows.report, flat_report(reported, as_many(terms, sizes.terms), torques, slips))
 
