@@ -17,7 +17,7 @@ ARITHMETIC = {
     "_moved": "rows of tensors for `integration.runge_kutta`; " + _SHARES,
     "surface_below": "times 0, for a tensor of the precision of the states",
     **dict.fromkeys(("__init__", "scene", "_moved_to"), _TIMES),
-    **dict.fromkeys(("_drive", "_scaled", "_counted", "careful_step", "step"), _SHARES),
+    **dict.fromkeys(("drive", "_scaled", "_counted", "careful_step", "step"), _SHARES),
     **dict.fromkeys(("_random_direction", "_restart", "_placed", "_displacement"), _DRAWS),
     "_observe": "counts of channels, and their units",
 }
