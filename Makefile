@@ -19,7 +19,7 @@ help: ## This list
 
 install: $(INSTALLED) ## Virtual environment in .venv with the package, editable, and all tools
 
-$(INSTALLED): pyproject.toml constraints.txt
+$(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python >= 3.11 is needed, $(PYTHON) is not; try for instance: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv .venv
@@ -48,7 +48,7 @@ papers-test: $(INSTALLED) ## Tests of papers/ alone
 lowest: $(LOWEST)/installed ## Some of the tests with the lowest versions that pyproject.toml allows
 	$(LOWEST)/bin/python -m pytest $(LOWEST_TESTS:%=tests/test_%.py)
 
-$(LOWEST)/installed: pyproject.toml constraints-lowest.txt
+$(LOWEST)/installed: pyproject.toml setup.py constraints-lowest.txt
 	$(PYTHON) -m venv $(LOWEST)
 	$(LOWEST)/bin/python -m pip install --quiet -c constraints-lowest.txt -e '.[test]'
 	@touch $@

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from caster_gym.paths.trajectory import Trajectory
     from caster_gym.robot import Robot, load_robot
     from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
+    from caster_gym.tasks.hold.environment import CasterHoldEnv, CasterHoldVectorEnv
     from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 
 __version__ = "0.1.0"
@@ -36,6 +37,8 @@ __all__ = [
     "Arena",
     "CasterFollowEnv",
     "CasterFollowVectorEnv",
+    "CasterHoldEnv",
+    "CasterHoldVectorEnv",
     "CasterTrackEnv",
     "CasterTrackVectorEnv",
     "ComputedTorque",
@@ -66,6 +69,8 @@ _HOMES = {
     "Arena": "caster_gym.arena.arena",
     "CasterFollowEnv": "caster_gym.tasks.follow.environment",
     "CasterFollowVectorEnv": "caster_gym.tasks.follow.environment",
+    "CasterHoldEnv": "caster_gym.tasks.hold.environment",
+    "CasterHoldVectorEnv": "caster_gym.tasks.hold.environment",
     "CasterTrackEnv": "caster_gym.tasks.track.environment",
     "CasterTrackVectorEnv": "caster_gym.tasks.track.environment",
     "ComputedTorque": "caster_gym.agents.control.computed_torque",

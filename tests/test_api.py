@@ -18,6 +18,8 @@ NAMES = [
     "Arena",
     "CasterFollowEnv",
     "CasterFollowVectorEnv",
+    "CasterHoldEnv",
+    "CasterHoldVectorEnv",
     "CasterTrackEnv",
     "CasterTrackVectorEnv",
     "ComputedTorque",

@@ -50,6 +50,12 @@ class CasterHoldVectorEnv(TaskVectorEnv):
 
     max_episode_steps truncates episodes earlier. All other arguments are those of `CasterHoldEnv`; seeds, autoreset
     modes and options are those of `CasterVectorEnv`.
+
+    >>> import caster_gym, gymnasium
+    >>> envs = gymnasium.make_vec("caster_gym:CasterHold-v0", num_envs=3, target=(1.0, 0.5, 1.57))
+    >>> observations, infos = envs.reset(seed=0)
+    >>> observations.shape, bool((infos["position_error"] < 0.43).all())
+    ((3, 25), True)
     """
 
     definition = TASK
