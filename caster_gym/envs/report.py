@@ -127,9 +127,9 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...], slipping: int = 
     Arrays (robots,) or (robots, width); of one robot, from its report (quantities,), numbers or arrays (width,). Reward
     terms, whose names are given, are in a dictionary. slipping: how many wheels may slip.
     """
-    end_of_terms, end = REPORT_ROWS + len(terms), len(reports) - slipping
+    end = REPORT_ROWS + len(terms)  # of the terms
     row: Any = reports
-    torque, impulse = reports[end_of_terms:end], reports[_IMPULSE]
+    torque, impulse = reports[end:-slipping] if slipping else reports[end:], reports[_IMPULSE]
     pose, reference_pose = reports[_POSE], reports[_REFERENCE_POSE]
     if reports.ndim > 1:
         torque, impulse, pose, reference_pose = torque.T, impulse.T, pose.T, reference_pose.T
@@ -138,7 +138,7 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...], slipping: int = 
     infos = {
         "position_error": row[_POSITION_ERROR],
         "heading_error": row[_HEADING_ERROR],
-        "reward_terms": dict(zip(terms, row[REPORT_ROWS:end_of_terms], strict=True)),
+        "reward_terms": dict(zip(terms, row[REPORT_ROWS:end], strict=True)),
         "torque": torque,
         "power": row[_POWER],
         "traction_use": row[_TRACTION],
@@ -158,7 +158,7 @@ def named(reports: NDArray[np.float64], terms: tuple[str, ...], slipping: int = 
         "touched": row[_TOUCHED] > 0.0,
     }
     if slipping:
-        infos["wheel_slip"] = reports[end:].T
+        infos["wheel_slip"] = reports[-slipping:].T
     return infos
 
 
