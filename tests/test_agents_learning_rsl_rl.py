@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,10 @@ from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 
 SEED, COUNT, LONGEST = 5, 3, 3
-QUICK = {"control_period": 0.01, "substeps": 1}  # one RK4 step a period: Torch alone, uncompiled, is slow
+QUICK: dict[str, Any] = {
+    "control_period": 0.01,
+    "substeps": 1,
+}  # one RK4 step a period: uncompiled Torch is slow
 SETTINGS = RslPPOSettings(
     algorithm="rsl_ppo", n_timesteps=24, n_envs=COUNT, n_steps=4, batch_size=6, n_epochs=2, net_arch=(8,), validations=2
 )
@@ -135,7 +139,7 @@ def test_a_device_that_is_not_there_is_named(tmp_path):
 
 
 def test_batches_must_be_whole():
-    fields = {"algorithm": "rsl_ppo", "n_envs": 4, "n_steps": 8}
+    fields: dict[str, Any] = {"algorithm": "rsl_ppo", "n_envs": 4, "n_steps": 8}
     parse(RslPPOSettings, {**fields, "batch_size": 16}, "agent")
     with pytest.raises(
         ConfigurationError, match=r"'batch_size' must divide n_envs · n_steps = 32 steps, got 12: .* is 8$"

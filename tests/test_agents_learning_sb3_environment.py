@@ -1,6 +1,7 @@
 """caster_gym.agents.learning.sb3_environment: SB3 learns the same from the native batch as from single environments."""
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,10 @@ from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import Tolerance, wrap
 
-TASK = {"corridor": 0.08, "path": {"shape": "circle", "radius": 0.5}}  # starts lie up to 0.07 m from the path
+TASK: dict[str, Any] = {
+    "corridor": 0.08,
+    "path": {"shape": "circle", "radius": 0.5},
+}  # starts are up to 0.07 m off
 LONGEST = 30
 COUNT = 3
 

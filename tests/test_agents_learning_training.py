@@ -3,7 +3,7 @@
 import csv
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -26,10 +26,10 @@ from caster_gym.shipped_files import read_settings
 from caster_gym.tasks.track.metrics import TrackVerdict, measure
 
 HELD_OUT_SEED = 7
-TINY = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2}
+TINY: dict[str, Any] = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2}
 PPO = PPOSettings(algorithm="ppo", n_timesteps=2048, n_steps=64, n_epochs=2, **TINY)
 SAC = SACSettings(algorithm="sac", n_timesteps=1600, gradient_steps=1, buffer_size=2000, learning_starts=200, **TINY)
-TENSORS = {"net_arch": (8,), "n_envs": 4, "compile": False, "device": "cpu"}
+TENSORS: dict[str, Any] = {"net_arch": (8,), "n_envs": 4, "compile": False, "device": "cpu"}
 RSL_PPO = RslPPOSettings(algorithm="rsl_ppo", n_timesteps=32, n_steps=4, batch_size=16, validations=2, **TENSORS)
 SHAC = SHACSettings(algorithm="shac", n_timesteps=24, n_steps=2, batch_size=8, validations=3, **TENSORS)
 LEARNERS = {"ppo": PPO, "sac": SAC, "rsl_ppo": RSL_PPO, "shac": SHAC}

@@ -6,6 +6,7 @@ import inspect
 import re
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -74,7 +75,14 @@ def prepared(tmp_path_factory):
     from caster_gym.tasks.track.parameters import TrackParameters
 
     robot, task = caster_gym.load_robot("chung2008"), TrackParameters()
-    described = {"format": 1, "name": "PPO", "squash": "clip", "hidden": (8,), "trained_with": {}, "versions": {}}
+    described: dict[str, Any] = {
+        "format": 1,
+        "name": "PPO",
+        "squash": "clip",
+        "hidden": (8,),
+        "trained_with": {},
+        "versions": {},
+    }
     description = PolicyDescription(robot=robot, task=task, **described)
     actor = Actor(description.layout.size, (8,), len(robot.driven), "clip")
     save_bundle(folder / "runs" / "ppo" / "best", Bundle(description, actor))

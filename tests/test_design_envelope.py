@@ -1,5 +1,7 @@
 """caster_gym.design.envelope: loads by closed forms against brute force, linear programmes and hand calculations."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -25,7 +27,7 @@ from caster_gym.paths.feasibility import motor_use
 from caster_gym.paths.specification import read_paths
 from tests.random_robots import random_robot
 
-LIMITS = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
+LIMITS: dict[str, Any] = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
 ROBOT = load_robot("chung2008")
 
 

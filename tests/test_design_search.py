@@ -2,6 +2,7 @@
 
 import re
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,8 +28,14 @@ from caster_gym.robot import Robot
 from tests.random_robots import random_robot
 
 ROBOT = load_robot("chung2008")
-LIMITS = {"speed": 1.0, "yaw_rate": 1.5, "acceleration": 0.8, "yaw_acceleration": 3.0, "accelerating_up_to": 0.7}
-BOUNDS = {"radius": (0.015, 0.05), "trail": (0.01, 0.05)}
+LIMITS: dict[str, Any] = {
+    "speed": 1.0,
+    "yaw_rate": 1.5,
+    "acceleration": 0.8,
+    "yaw_acceleration": 3.0,
+    "accelerating_up_to": 0.7,
+}
+BOUNDS: dict[str, Any] = {"radius": (0.015, 0.05), "trail": (0.01, 0.05)}
 EVEN = DesignTarget(**LIMITS, **BOUNDS, objective="isotropy")
 STRONG = DesignTarget(**LIMITS, **BOUNDS, objective="use")
 LIGHT = DesignTarget(**LIMITS, **BOUNDS, objective="torque")
@@ -129,7 +136,7 @@ def test_the_least_use_keeps_away_from_wheels_that_turn_too_fast():
         for caster in ROBOT.casters
     ]
     robot = ROBOT.model_copy(update={"casters": tuple(slow)})
-    bounds = {"radius": (0.02, 0.04), "trail": (0.02, 0.03)}
+    bounds: dict[str, Any] = {"radius": (0.02, 0.04), "trail": (0.02, 0.03)}
     strong = optimise(robot, DesignTarget(**LIMITS, **bounds, objective="use"))
     assert np.isinf(strong.own[2])  # 1 m/s over 25 mm is 40 rad/s, with the margin of 1.3 52 of 50
     assert strong.radius > 0.026  # with which the margin's 1.3 m/s are 50 rad/s

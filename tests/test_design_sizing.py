@@ -1,5 +1,7 @@
 """caster_gym.design.sizing: requirements that are proportional, enough and no more than enough."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,8 +20,8 @@ from caster_gym.design.target import Target
 from caster_gym.paths.feasibility import motor_use
 
 ROBOT = load_robot("chung2008")
-LIMITS = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
-GENTLE = {"speed": 0.05, "yaw_rate": 0.1, "acceleration": 0.02, "yaw_acceleration": 0.05}
+LIMITS: dict[str, Any] = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
+GENTLE: dict[str, Any] = {"speed": 0.05, "yaw_rate": 0.1, "acceleration": 0.02, "yaw_acceleration": 0.05}
 PATHS = ({"shape": "circle", "duration": 6.0}, {"shape": "rounded_square"}, {"shape": "random_paths", "count": 4})
 FEW = sampled_motions(3, 64)
 

@@ -1,5 +1,7 @@
 """caster_gym.design.target: payloads against energies, and targets that nothing can meet."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,7 @@ from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.design.target import Payload, Target, check_actuation, check_conditioning, driven_as, loaded
 from tests.random_robots import random_motion, random_robot
 
-LIMITS = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
+LIMITS: dict[str, Any] = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
 
 
 def test_a_payload_adds_its_own_kinetic_energy_and_nothing_else():

@@ -4,6 +4,7 @@ import copy
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import cloudpickle
 import gymnasium as gym
@@ -16,8 +17,8 @@ from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVec
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, MotorLag, Payload, Potential, Pushes, SensorNoise, Smoothness, wrap
 
-ARENA = {"path": {"shape": "circle", "radius": 0.5}, "arena": {"room": [[-1.0, -1.0], [1.0, 1.0]]}}
-TASK = {"path": [{"shape": "circle", "radius": 0.5}, "lemniscate"]}
+ARENA: dict[str, Any] = {"path": {"shape": "circle", "radius": 0.5}, "arena": {"room": [[-1.0, -1.0], [1.0, 1.0]]}}
+TASK: dict[str, Any] = {"path": [{"shape": "circle", "radius": 0.5}, "lemniscate"]}
 FEATURES = (
     Payload(mass=(0.0, 2.0)),
     SensorNoise(position=0.01, heading_bias=0.02),

@@ -1,6 +1,7 @@
 """caster_gym.envs.inputs: what cannot be used is refused with a sentence, alone and in batches, and changes nothing."""
 
 import warnings
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +17,7 @@ from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVec
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import SensorNoise, wrap
 
-TASK = {"path": {"shape": "circle", "radius": 0.5}}
+TASK: dict[str, Any] = {"path": {"shape": "circle", "radius": 0.5}}
 WIDTH = 6  # driven joints of the default robot
 
 

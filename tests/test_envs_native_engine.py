@@ -1,5 +1,7 @@
 """envs.native.engine: obstacles on the way, what they do to robots and to rewards, and the engine's hooks."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -20,7 +22,7 @@ ARENA = {
     "polygons": [{"corners": [[0.0, -0.9], [0.4, -0.8], [0.0, -0.75]]}],
 }
 WALL = {"half_planes": [{"point": [0.8, 0.0], "normal": [-1.0, 0.0]}]}  # on the right, 0.15 m from the path's start
-EXACT_START = {"start_offset": 0.0, "start_turn": 0.0}
+EXACT_START: dict[str, Any] = {"start_offset": 0.0, "start_turn": 0.0}
 FIELDS = PlatformParameters._fields + CasterParameters._fields * 3
 
 

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -63,7 +64,7 @@ def test_so_does_that_of_an_environment_with_features():
 
 
 def test_what_was_given_in_plain_values_stays():
-    given = {"path": [{"shape": "circle", "radius": 0.5}], "corridor": 0.4}
+    given: dict[str, Any] = {"path": [{"shape": "circle", "radius": 0.5}], "corridor": 0.4}
     assert gym.make("caster_gym:CasterTrack-v0", **given).spec.kwargs == given
 
 

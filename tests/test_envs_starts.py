@@ -1,6 +1,7 @@
 """caster_gym.envs.starts: a start that is given is the one that is had, alone, in a batch and in Torch."""
 
 import re
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -17,8 +18,8 @@ from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVec
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import ActionDelay, Payload, SensorNoise, wrap
 
-POOL = {"path": [{"shape": "circle", "radius": 0.5}, "lemniscate"]}
-CIRCLE = {"path": {"shape": "circle", "radius": 0.5}}
+POOL: dict[str, Any] = {"path": [{"shape": "circle", "radius": 0.5}, "lemniscate"]}
+CIRCLE: dict[str, Any] = {"path": {"shape": "circle", "radius": 0.5}}
 SEED, COUNT = 5, 3
 KINDS = {"time": (CasterTrackEnv, CasterTrackVectorEnv), "progress": (CasterFollowEnv, CasterFollowVectorEnv)}
 PLACES = np.array([0.1, 0.44, 1.0])  # [s] or [m]

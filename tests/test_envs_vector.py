@@ -1,6 +1,7 @@
 """caster_gym.tasks.track.environment: the native batch equals Gymnasium's SyncVectorEnv of single environments."""
 
 import copy
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +14,10 @@ from caster_gym.engines.native.lanes import LANES
 from caster_gym.engines.native.threads import BLOCKS_PER_SHARE, get_threads, set_threads
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 
-TASK = {"corridor": 0.12, "path": {"shape": "circle", "radius": 0.5}}  # random torques leave it, sooner or later
+TASK: dict[str, Any] = {
+    "corridor": 0.12,
+    "path": {"shape": "circle", "radius": 0.5},
+}  # random torques leave it, sooner or later
 LONGEST = 40
 SEED = 11
 

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +22,7 @@ from tests.test_envs_vector import assert_same, random_actions
 ID = "caster_gym:CasterFollow-v0"
 CIRCLE = {"shape": "circle", "radius": 0.4}
 POOL = [CIRCLE, "lemniscate", {"shape": "rounded_square", "side": 0.8, "rounding": 0.4}]
-NARROW = {
+NARROW: dict[str, Any] = {
     "path": POOL,
     "arena": {"beside": {"pillars": 3, "walls": 2, "gap": [0.03, 0.06], "pillar_radius": [0.03, 0.06]}},
     "start_offset": 0.01,

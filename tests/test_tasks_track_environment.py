@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -19,7 +20,7 @@ from caster_gym.tasks.track.environment import CasterTrackEnv
 
 ID = "caster_gym:CasterTrack-v0"
 CIRCLE = {"shape": "circle", "radius": 0.3, "duration": 6.0}  # 300 steps; a robot at rest stays within 0.65 m of it
-WIDE = {"path": CIRCLE, "corridor": 5.0}
+WIDE: dict[str, Any] = {"path": CIRCLE, "corridor": 5.0}
 
 
 def rest(env):

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -27,7 +28,10 @@ from caster_gym.wrappers import (
     wrap,
 )
 
-TASK = {"corridor": 0.12, "path": {"shape": "circle", "radius": 0.5}}  # random torques leave it, sooner or later
+TASK: dict[str, Any] = {
+    "corridor": 0.12,
+    "path": {"shape": "circle", "radius": 0.5},
+}  # random torques leave it, sooner or later
 LONGEST = 40
 SEED = 11
 
@@ -212,7 +216,7 @@ def test_made_environments_can_be_wrapped():
 
 
 def test_course_following_can_be_wrapped():
-    made = {"max_episode_steps": 30, "path": "circle"}
+    made: dict[str, Any] = {"max_episode_steps": 30, "path": "circle"}
     ours = wrap(gym.make_vec("caster_gym:CasterFollow-v0", num_envs=3, **made), *TORQUES)
     theirs = SyncVectorEnv([lambda: wrap(gym.make("caster_gym:CasterFollow-v0", **made), *TORQUES)] * 3)
     assert_same(ours.reset(seed=SEED), theirs.reset(seed=SEED))

@@ -1,6 +1,7 @@
 """caster_gym.wrappers.rewards: shaping that changes no optimal policy, and terms that add up."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ PATH = {"shape": "circle", "radius": 0.5}
 ROBOT = load_robot("chung2008")
 LIMITS = np.array([motor.max_torque for caster in ROBOT.casters for motor in (caster.roll, caster.steer)])
 DISCOUNT = 0.9
-NEAR = {"quantity": "position_error", "margin": 0.4}
+NEAR: dict[str, Any] = {"quantity": "position_error", "margin": 0.4}
 TERMS = (
     Potential(**NEAR, discount=0.97, weight=3.0),
     Tolerance(quantity="heading_error", bounds=(-0.1, 0.1), margin=0.2, weight=0.3),

@@ -1,5 +1,7 @@
 """caster_gym.wrappers.sensors: what is measured, and what follows from it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -162,7 +164,12 @@ def test_steering_noise_turns_every_direction():
 
 
 def test_obstacles_are_seen_from_where_the_robot_is():
-    task = {"path": PATH, "corridor": 100.0, "arena": {"pillars": [{"centre": [1.0, 0.0]}]}, "nearest": 3}
+    task: dict[str, Any] = {
+        "path": PATH,
+        "corridor": 100.0,
+        "arena": {"pillars": [{"centre": [1.0, 0.0]}]},
+        "nearest": 3,
+    }
     noisy, clean = (wrap(CasterTrackVectorEnv(5, **task), *f) for f in ([SensorNoise(position=0.1, heading=0.3)], []))
     layout = clean.unwrapped.engine.layout
     shown, true = moving(noisy), moving(clean)
