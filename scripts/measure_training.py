@@ -25,7 +25,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 from tqdm import tqdm
 
-from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out, training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.agents.learning.actor import Actor
@@ -201,7 +201,7 @@ def train_timed(name: str, task: TaskSettings, settings: LearnerSettings, seed: 
 
 def trials(task: TaskSettings, agent: Agent) -> tuple[Trial, ...]:
     """Episodes of an agent on all test paths, from the benchmark's starts and some more."""
-    batch = test_batch(task, task.test, STARTS)
+    batch = evaluation_batch(task, task.test, STARTS)
     how = bare(batch).definition.metrics
     episodes = roll_out(agent, batch, TEST_SEED)
     metrics = how.measure(episodes, how.settling)

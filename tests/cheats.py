@@ -24,7 +24,8 @@ def direction(observations: NDArray[np.float32], layout: ObservationLayout) -> A
     """Unit vectors (robots, 2) in B from the reference towards the farthest previewed point; 0 at the path's end."""
     farthest = layout.physical(observations, f"preview_{max(layout.preview):g}{layout.unit}")[:, :2]
     ahead = farthest - layout.physical(observations, "position_error")
-    return ahead / np.maximum(np.hypot(*ahead.T), 1e-6)[:, None]
+    unit: Array = ahead / np.maximum(np.hypot(*ahead.T), 1e-6)[:, None]
+    return unit
 
 
 def left_of(vectors: Array) -> Array:

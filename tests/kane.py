@@ -99,14 +99,16 @@ class Kane:
         down[:, 2, 0] = -self.radius
         velocity, spin = velocity[1 + self.count :], spin[1 + self.count :]
         slip = velocity + torch.linalg.cross(spin, down.expand_as(spin), dim=1)
-        return slip[:, :2].reshape(2 * self.count, -1)
+        rows: Tensor = slip[:, :2].reshape(2 * self.count, -1)
+        return rows
 
     def _partial(self, q: Tensor) -> Tensor:
         """Rates of q (n, 3) for each unit twist: the null space of the constraints, in terms of the twist."""
         pose = torch.cat((torch.cat((_plane(q[2]).T, torch.zeros(2, 1)), 1), torch.tensor([[0.0, 0.0, 1.0]])))
         body = torch.cat((pose, torch.zeros(3, 2 * self.count, dtype=torch.float64)), 1)
         both = torch.cat((self._contact_rows(q), body))
-        return torch.linalg.inv(both)[:, -3:]
+        partial: Tensor = torch.linalg.inv(both)[:, -3:]
+        return partial
 
     def _partial_velocities(self, q: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Of mass centres, of attitudes, and of joints and motors, per unit twist."""
@@ -127,7 +129,7 @@ class Kane:
         """Rates of change of momentum, of spin (2 N + 1, 3), and of the spin of gears and rotors (4 N), in W."""
         partial = self._partial_velocities(q)
         move = self._partial(q) @ twist
-        _, drift = jvp(lambda q: tuple(part @ twist for part in self._partial_velocities(q)), (q,), (move,))
+        _, drift = jvp(lambda q: tuple(part @ twist for part in self._partial_velocities(q)), (q,), (move,))[:2]
         a, alpha, joint = (p @ twist_rate + e for p, e in zip(partial, drift, strict=True))
         omega = (partial[1] @ twist)[..., None]
         return self.masses[:, None] * a, self._spin_rate(q, omega, alpha), self.spinning * joint
@@ -135,7 +137,8 @@ class Kane:
     def _spin_rate(self, q: Tensor, omega: Tensor, alpha: Tensor) -> Tensor:
         """Rate of change (2 N + 1, 3) of the spin of bodies that turn at omega (2 N + 1, 3, 1), in W."""
         tensors = self._inertia_tensors(q)
-        return (tensors @ alpha[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1))[..., 0]
+        rate: Tensor = tensors @ alpha[..., None] + torch.linalg.cross(omega, tensors @ omega, dim=1)
+        return rate[..., 0]
 
     def _summed_inertia(self, q: Tensor, v: Tensor, w: Tensor, joint: Tensor) -> Tensor:
         """Inertia of all bodies, gears and rotors for the coordinates in which their velocities are given."""
@@ -207,7 +210,7 @@ class Kane:
             v, w, _ = self._partial_velocities(q)
             return self._momentum(q, v @ nu, w @ nu, fixed)
 
-        _, (force, moment) = jvp(momentum, (q, nu), (self._partial(q) @ nu, rate))
+        _, (force, moment) = jvp(momentum, (q, nu), (self._partial(q) @ nu, rate))[:2]
         back = _about_z(q[2:3])[0].T
         return (back @ force).numpy(), (back @ moment).numpy()
 

@@ -47,7 +47,8 @@ class FreeKane(Kane):
         turn = torch.eye(3, dtype=torch.float64)
         turn[:2, :2] = _plane(q[2])
         mobility = torch.linalg.inv(self._masses_of(q))[:3, :3]
-        return torch.linalg.inv(turn.T @ mobility @ turn).numpy()
+        beside: np.ndarray = torch.linalg.inv(turn.T @ mobility @ turn).numpy()
+        return beside
 
     def accelerations(
         self,
@@ -85,15 +86,17 @@ class FreeKane(Kane):
             v, w = self._velocities(q)
             return self._momentum(q, v @ move, w @ move, fixed)[1]
 
-        _, moment = jvp(spin, (q, move), (move, self._second(q, move, torque, floor, wrench)))
+        _, moment = jvp(spin, (q, move), (move, self._second(q, move, torque, floor, wrench)))[:2]
         push = self.height * torch.as_tensor(wrench)[:2]
         return (_plane(q[2]).T @ torch.stack((moment[1], -moment[0])) - push).numpy()
 
     def _second(self, q: Tensor, move: Tensor, torque: np.ndarray, floor: np.ndarray, wrench: np.ndarray) -> Tensor:
         """Second derivatives of q."""
         v0, w0 = self._velocities(q)
-        _, (drift, turning) = jvp(lambda q: tuple(part @ move for part in self._velocities(q)), (q,), (move,))
+        _, (drift, turning) = jvp(lambda q: tuple(part @ move for part in self._velocities(q)), (q,), (move,))[:2]
         own = self._spin_rate(q, (w0 @ move)[..., None], turning)
         bias = torch.einsum("bij,bi->j", v0, self.masses[:, None] * drift) + torch.einsum("bij,bi->j", w0, own)
         held = torch.einsum("nij,ni->j", self._floor_rows(q), torch.as_tensor(floor))
-        return torch.linalg.solve(self._masses_of(q), self._applied(q, move, torque, wrench) + held - bias)
+        force = self._applied(q, move, torque, wrench) + held - bias
+        rate: Tensor = torch.linalg.solve(self._masses_of(q), force)
+        return rate

@@ -1,5 +1,7 @@
 """Moments made by hand, and what a task's reward is of them."""
 
+from typing import Any
+
 from caster_gym.envs.report import Record, Situation
 from caster_gym.envs.tracking import Errors, Moment, unless
 from caster_gym.mechanics.scalars import each
@@ -20,5 +22,6 @@ def weights_of(task, **changed):
 def terms_of(task, weights, errors=NO_ERROR, share=0.0, effort=0.0, pressing=0.0, failed=0.0):
     """Terms of a task's reward; 0 in a step that fails."""
     record = untouched()._replace(pressing=pressing)
-    terms = task.reward(Moment(None, None, errors, effort, record, Situation(0.0, share, 0.0)), weights)
+    nothing: Any = None  # no reward looks at the state or at the reference
+    terms = task.reward(Moment(nothing, nothing, errors, effort, record, Situation(0.0, share, 0.0)), weights)
     return task.terms(*each(unless, (failed,), terms[:]))

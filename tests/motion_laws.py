@@ -7,7 +7,8 @@ from caster_gym.paths.trajectory import Trajectory
 
 def slope(values: np.ndarray, h: float) -> np.ndarray:
     """Derivative at all samples but two at each end; its error is h⁴/30 times the fifth derivative."""
-    return (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / (12.0 * h)
+    differences: np.ndarray = values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]
+    return differences / (12.0 * h)
 
 
 def derivative_error(trajectories: tuple[Trajectory, ...]) -> float:

@@ -1,6 +1,7 @@
 """Scenes to draw, made by hand."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,9 @@ CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)  # of 1 m about the 
 
 def obstacles(*, pillars=(), half_planes=(), polygons=()):
     """pillars: (x, y, radius). half_planes: (nx, ny, offset). polygons: corners, counter-clockwise."""
-    faces, corners, radii, spans = [], [], [], []
+    faces: list[Any] = []
+    corners: list[Any] = []
+    radii, spans = [], []
     for x, y, radius in pillars:
         spans.append((len(faces), len(faces), len(corners), len(corners) + 1))
         corners.append((x, y))

@@ -11,7 +11,7 @@ import yaml
 from numpy.testing import assert_array_equal
 
 from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
-from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out
 from caster_gym.agents.comparison.results import Contender, compare
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history, tune
@@ -26,8 +26,6 @@ from caster_gym.configuration import ConfigurationError
 from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.follow.metrics import FollowMetrics, FollowVerdict
 from caster_gym.tasks.track.metrics import TrackMetrics, TrackVerdict, measure
-
-test_batch.__test__ = False  # a name that pytest would take for a test
 
 SEEDS = [2, 5]
 STARTS = 2
@@ -133,7 +131,7 @@ def test_every_seed_is_trained_for_itself(finished):
 def test_episodes_can_be_measured_again_from_the_policies(finished, settings, task):
     """The numbers of each seed are those of its policy on the same starts."""
     folder, _ = finished
-    batch = test_batch(task, task.test, STARTS)
+    batch = evaluation_batch(task, task.test, STARTS)
     for policy in (file.parent for file in (folder / "policies").rglob("run.yaml")):
         bundle = load_policy(policy / "best")
         metrics = measure(roll_out(bundle.agent, batch, settings.start_seed), settings.settling)
@@ -155,7 +153,7 @@ class Recorder:
 
 
 def test_all_agents_get_the_same_starts_and_paths(settings, task):
-    batch = test_batch(task, task.test, STARTS)
+    batch = evaluation_batch(task, task.test, STARTS)
     agents = [
         Recorder(ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period), f"{frequency}")
         for frequency in (5.0, 10.0)
@@ -170,7 +168,7 @@ def test_all_agents_get_the_same_starts_and_paths(settings, task):
 
 def test_the_natural_frequency_is_chosen_on_validation_paths(task):
     """The best of those listed there, whatever would do better elsewhere."""
-    batch = test_batch(task, task.validation, starts=1)
+    batch = evaluation_batch(task, task.validation, starts=1)
     listed = (3.0, 30.0, 1.0, 12.0)
     errors = {}
     for frequency in listed:
@@ -178,8 +176,8 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
         metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
         errors[frequency] = metrics.position_rmse.mean()
     settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
-    agent, best = tune(settings, batch)
-    frequency = min(errors, key=errors.get)
+    _, best = tune(settings, batch)
+    frequency = min(errors, key=lambda one: errors[one])
     assert best == settings.model_copy(update={"natural_frequencies": (frequency,)})
     assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
 
@@ -189,6 +187,7 @@ def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
     """Here the folder of a run cannot be made, since a file is there."""
     (tmp_path / "taken").write_text("", encoding="utf-8")
     agent = read_agent(settings.agents[1], {"n_timesteps": 512})
+    assert isinstance(agent, LearnerSettings)
     with pytest.raises(OSError, match="taken"):
         train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
 
@@ -207,6 +206,7 @@ def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, 
     monkeypatch.setattr(training, "usable_cores", lambda: 16)
     monkeypatch.setattr(training, "_train_job", lambda index, job, threads, reports: submitted.append(threads))
     agent = read_agent(settings.agents[1], {"n_timesteps": 512})
+    assert isinstance(agent, LearnerSettings)
     train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)
     assert pools == [processes]
     assert submitted == 5 * [threads[0] if threads else 1]
@@ -268,7 +268,7 @@ def test_computed_torque_is_refused_where_actions_are_no_torques(task):
     commanded = TaskSettings.model_validate({**task.model_dump(), "wrappers": ["twist_commands"]})
     settings = ComputedTorqueSettings(algorithm="computed torque")
     with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
-        tune(settings, test_batch(commanded, commanded.validation, starts=1))
+        tune(settings, evaluation_batch(commanded, commanded.validation, starts=1))
 
 
 @pytest.mark.parametrize("name", names_of("benchmarks"))

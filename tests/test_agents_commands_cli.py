@@ -2,6 +2,7 @@
 
 import csv
 import shutil
+from typing import Any
 
 import pytest
 import yaml
@@ -242,7 +243,7 @@ def test_ctrl_c_ends_quietly_and_keeps_what_was_learned(call, tmp_path, monkeypa
 
 def all_commands():
     """Every command by name, and the group of them."""
-    group = get_command(app)
+    group: Any = get_command(app)
     return {"": group, **group.commands}
 
 

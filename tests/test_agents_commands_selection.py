@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from caster_gym.agents.commands.selection import choose_agent, choose_task
-from caster_gym.agents.comparison.evaluation import test_batch
+from caster_gym.agents.comparison.evaluation import evaluation_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import DESCRIPTION, Bundle, PolicyDescription, save_bundle
@@ -13,8 +13,6 @@ from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import load_robot
 from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.track.parameters import TrackParameters
-
-test_batch.__test__ = False  # a name that pytest would take for a test
 
 
 def shipped(name):
@@ -97,7 +95,7 @@ def changed(file, **changes):
 
 def try_policy(policy):
     settings = choose_task(str(policy), None).settings
-    return choose_agent(str(policy), settings, test_batch(settings, settings.test[:1], 1)).agent
+    return choose_agent(str(policy), settings, evaluation_batch(settings, settings.test[:1], 1)).agent
 
 
 def test_a_policy_is_evaluated_without_a_look_at_its_code(stranger):
@@ -128,5 +126,5 @@ def test_no_file_beside_a_policy_is_an_agent_with_code(stranger, file):
     place.write_text("algorithm: stranger:Thing", encoding="utf-8")
     settings = shipped("track")
     with pytest.raises(ConfigurationError):
-        choose_agent(str(place), settings, test_batch(settings, settings.test[:1], 1))
+        choose_agent(str(place), settings, evaluation_batch(settings, settings.test[:1], 1))
     assert not list(stranger.parent.rglob("*.ran"))

@@ -10,6 +10,7 @@ from caster_gym import load_robot
 from caster_gym.agents.commands import watch as module
 from caster_gym.agents.commands.selection import choose_agent
 from caster_gym.agents.commands.watch import watch
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.keyboard import (
     KEYS,
     SLOWING,
@@ -19,6 +20,8 @@ from caster_gym.agents.control.keyboard import (
     wanted_shares,
 )
 from caster_gym.render.pygame_loader import pygame
+from caster_gym.render.viewer import Viewer
+from caster_gym.shipped_files import read_settings
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 
 RANDOM = {"shape": "random_paths", "duration": 2.2, "max_speed": 0.3}
@@ -49,7 +52,7 @@ def window(setup, monkeypatch):
     """A window that nobody sees, as if there were a display; returns a function that presses or releases keys."""
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setattr(module, "has_display", lambda: True)
-    held = set()
+    held: set[str] = set()
     monkeypatch.setattr(module, "keys_of_window", lambda: frozenset(held))
     yield held
     pygame.display.quit()
@@ -78,7 +81,7 @@ def test_the_same_seed_gives_the_same_film(setup):
 
 def test_several_robots_are_shown_until_the_last_has_ended(setup):
     """The circle takes longer than the random paths; their robots stay where they ended."""
-    settings = module.read_settings(module.TaskSettings, "tasks", "task.yaml")
+    settings = read_settings(TaskSettings, "tasks", "task.yaml")
     batch = module._batch(settings, 3)
     agent = choose_agent("agent.yaml", settings, batch).agent
     shown = list(module._scenes(agent, batch, np.arange(3), seed=0, once=True))
@@ -91,7 +94,7 @@ def test_several_robots_are_shown_until_the_last_has_ended(setup):
 
 @pytest.mark.parametrize(("path", "index"), [("circle", 2), ("1", 1), (0, 0)])
 def test_a_path_is_chosen_by_name_or_index(setup, path, index):
-    settings = module.read_settings(module.TaskSettings, "tasks", "task.yaml")
+    settings = read_settings(TaskSettings, "tasks", "task.yaml")
     batch = module._batch(settings, 1)
     assert module._index(path, batch) == index
 
@@ -99,7 +102,7 @@ def test_a_path_is_chosen_by_name_or_index(setup, path, index):
 @pytest.mark.slow
 def test_without_save_episodes_follow_each_other_until_the_window_is_closed(setup, window, monkeypatch):
     moments = []
-    show = module.Viewer.show
+    show = Viewer.show
 
     def seen(viewer, scenes):
         moments.append(scenes[0].time)
@@ -108,7 +111,7 @@ def test_without_save_episodes_follow_each_other_until_the_window_is_closed(setu
         viewer.fps = 1e4  # no need to wait
         return show(viewer, scenes)
 
-    monkeypatch.setattr(module.Viewer, "show", seen)
+    monkeypatch.setattr(Viewer, "show", seen)
     watch("agent.yaml", "task.yaml", size=SMALL)
     assert len(moments) == 2 * STEPS
     assert moments.count(0.0) == 2
@@ -161,14 +164,14 @@ def test_every_key_has_a_name_that_pygame_knows(window):
 def test_a_person_drives_where_the_keys_say(setup, window, monkeypatch):
     window.add("w")
     scenes = []
-    show = module.Viewer.show
+    show = Viewer.show
 
     def seen(viewer, what):
         scenes.append(what[0])
         viewer.fps = 1e4
         return show(viewer, what)
 
-    monkeypatch.setattr(module.Viewer, "show", seen)
+    monkeypatch.setattr(Viewer, "show", seen)
     shown = watch("keyboard", "task.yaml", seconds=1.5, size=SMALL, save=setup / "drive.gif")
     assert shown == 76
     ahead = scenes[-1].pose[:2] - scenes[0].pose[:2]
@@ -211,8 +214,8 @@ def test_an_interrupted_film_leaves_nothing(setup, monkeypatch):
             raise KeyboardInterrupt
         return np.zeros((64, 96, 3), dtype=np.uint8)
 
-    monkeypatch.setattr(module.Viewer, "show", interrupted)
-    monkeypatch.setattr(module.Viewer, "frame", lambda _: np.zeros((64, 96, 3), dtype=np.uint8))
+    monkeypatch.setattr(Viewer, "show", interrupted)
+    monkeypatch.setattr(Viewer, "frame", lambda _: np.zeros((64, 96, 3), dtype=np.uint8))
     with pytest.raises(KeyboardInterrupt):
         watch("agent.yaml", "task.yaml", save=setup / "run.mp4", size=SMALL)
     assert sorted(path.name for path in setup.iterdir()) == ["agent.yaml", "task.yaml"]

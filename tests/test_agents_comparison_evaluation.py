@@ -1,16 +1,16 @@
 """agents.comparison.evaluation: the same episodes for every agent, in every environment, with and without features."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch, training_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out, training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import parse
 from caster_gym.tasks.episodes import Episodes
-
-test_batch.__test__ = False  # a name that pytest would take for a test
 
 TASK = parse(
     TaskSettings,
@@ -30,7 +30,7 @@ class Rest:
     """Asks for nothing; keeps what it saw first."""
 
     name = "rest"
-    first = None
+    first: Any = None
 
     def act(self, observations):
         self.first = observations.copy() if self.first is None else self.first
@@ -61,7 +61,7 @@ def assert_same(first, second):
 
 
 def test_every_path_gets_its_starts_and_every_agent_the_same():
-    batch = test_batch(TASK, TASK.test, starts=2)
+    batch = evaluation_batch(TASK, TASK.test, starts=2)
     mine, other = (roll_out(tracker(batch, frequency), batch, seed=4) for frequency in (5.0, 15.0))
     assert mine.names == other.names == ("random_paths 0", "random_paths 1", "circle") * 2
     assert_array_equal(mine.reference, other.reference)
@@ -76,14 +76,14 @@ def test_every_path_gets_its_starts_and_every_agent_the_same():
 
 
 def test_a_roll_out_repeats_to_the_last_bit():
-    batch = test_batch(TASK, TASK.test, starts=1)
+    batch = evaluation_batch(TASK, TASK.test, starts=1)
     first = roll_out(tracker(batch), batch, seed=4)
     assert_same(first, roll_out(tracker(batch), batch, seed=4))
-    assert_same(first, roll_out(tracker(batch), test_batch(TASK, TASK.test, starts=1), seed=4))
+    assert_same(first, roll_out(tracker(batch), evaluation_batch(TASK, TASK.test, starts=1), seed=4))
 
 
 def test_series_last_as_long_as_their_paths():
-    batch = test_batch(TASK, TASK.test, starts=1)
+    batch = evaluation_batch(TASK, TASK.test, starts=1)
     found = roll_out(tracker(batch), batch, seed=4)
     lengths = [len(one) - 1 for one in bare(batch).engine.plan.tables]
     assert lengths == [150, 150, 400]
@@ -103,7 +103,7 @@ def test_series_last_as_long_as_their_paths():
 def test_a_failure_ends_its_series_and_is_tagged():
     """A robot that rests is left behind by paths that go further than the corridor reaches."""
     tight = TASK.model_copy(update={"task": TASK.task.model_copy(update={"corridor": 0.1})})
-    batch = test_batch(tight, TASK.test, starts=1)
+    batch = evaluation_batch(tight, TASK.test, starts=1)
     found = roll_out(Rest(), batch, seed=4)
     assert found.failed.all()
     lengths = np.isfinite(found.reward).sum(axis=0)
@@ -117,7 +117,7 @@ def test_a_failure_ends_its_series_and_is_tagged():
 
 
 def test_a_series_that_ends_in_time_has_not_failed():
-    batch = test_batch(TASK, TASK.train, starts=1)
+    batch = evaluation_batch(TASK, TASK.train, starts=1)
     assert not roll_out(tracker(batch), batch, seed=0).failed.any()
 
 
@@ -125,14 +125,14 @@ def test_training_runs_on_training_paths():
     batch = training_batch(TASK, 5)
     assert batch.num_envs == 5
     assert list(bare(batch).engine.plan.names) == [f"random_paths {k}" for k in range(3)]
-    held_out = test_batch(TASK, TASK.test, starts=1).engine.plan.tables
+    held_out = bare(evaluation_batch(TASK, TASK.test, starts=1)).engine.plan.tables
     for one in bare(batch).engine.plan.tables:
         assert not any(np.array_equal(one, other) for other in held_out)
 
 
 def test_following_ends_at_goals_that_can_be_reached():
     """A controller arrives, within an arrival of the end and near the time of the law; one that rests does not."""
-    batch = test_batch(FOLLOW, FOLLOW.test, starts=2)
+    batch = evaluation_batch(FOLLOW, FOLLOW.test, starts=2)
     found = roll_out(tracker(batch), batch, seed=4)
     assert np.isfinite(found.reward).sum(axis=0).tolist() == found.allowed.tolist()
     periods = found.allowed * found.period
@@ -148,7 +148,7 @@ def test_following_ends_at_goals_that_can_be_reached():
 
 
 def test_a_timetable_has_no_goal():
-    batch = test_batch(TASK, TASK.test, starts=1)
+    batch = evaluation_batch(TASK, TASK.test, starts=1)
     found = roll_out(tracker(batch), batch, seed=4)
     assert not found.facts
     assert found.allowed.tolist() == [150, 150, 400]
@@ -164,12 +164,12 @@ def with_features(settings, **features):
 def test_rewards_are_those_of_the_task_alone(settings):
     """Terms that wrappers or shaping add change no episode and no reward that is told."""
     term = {"kind": "tolerance", "quantity": "position_error", "margin": 0.1, "weight": 5.0}
-    batch = test_batch(settings, settings.test, starts=1)
+    batch = evaluation_batch(settings, settings.test, starts=1)
     plain = roll_out(tracker(batch), batch, seed=4)
     shaped = with_features(settings, shaping=[term])
-    assert_same(plain, roll_out(tracker(batch), test_batch(shaped, settings.test, starts=1), seed=4))
+    assert_same(plain, roll_out(tracker(batch), evaluation_batch(shaped, settings.test, starts=1), seed=4))
     wrapped = with_features(settings, wrappers=[term])
-    found = roll_out(tracker(batch), test_batch(wrapped, settings.test, starts=1), seed=4)
+    found = roll_out(tracker(batch), evaluation_batch(wrapped, settings.test, starts=1), seed=4)
     assert_array_equal(found.reward, plain.reward)
     assert_array_equal(found.pose, plain.pose)
 
@@ -177,16 +177,14 @@ def test_rewards_are_those_of_the_task_alone(settings):
 def test_shaping_is_for_training_and_wrappers_are_for_both():
     term = {"kind": "tolerance", "quantity": "position_error", "margin": 0.1, "weight": 5.0}
     settings = with_features(FOLLOW, shaping=[term], wrappers=["motor_lag"])
-    kinds = [
-        [feature.model_dump()["kind"] for feature in batch.features]
-        for batch in (training_batch(settings, 2), test_batch(settings, settings.test, starts=1))
-    ]
+    batches: list[Any] = [training_batch(settings, 2), evaluation_batch(settings, settings.test, starts=1)]
+    kinds = [[feature.model_dump()["kind"] for feature in batch.features] for batch in batches]
     assert kinds == [["motor_lag", "tolerance"], ["motor_lag"]]
 
 
 def test_what_wrappers_make_of_actions_is_no_saturation():
     """Motors that lag give less than what was asked, though no limit cuts it."""
     settings = with_features(TASK, wrappers=[{"kind": "motor_lag", "time_constant": 0.05}])
-    batch = test_batch(settings, settings.test, starts=1)
+    batch = evaluation_batch(settings, settings.test, starts=1)
     found = roll_out(tracker(batch), batch, seed=4)
     assert_array_equal(found.command, found.share)

@@ -9,7 +9,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.patches import Circle, Polygon
 
-from caster_gym.agents.comparison.evaluation import bare, roll_out, test_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out
 from caster_gym.agents.comparison.figures import draw_learning, draw_obstacles, draw_path, draw_speeds, learning_curves
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation
@@ -17,8 +17,6 @@ from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import parse
 from caster_gym.tasks.follow.metrics import FollowVerdict
 from caster_gym.tasks.task import Pictures
-
-test_batch.__test__ = False  # a name that pytest would take for a test
 
 PATHS = {"train": [{"shape": "ellipse"}], "validation": [{"shape": "lemniscate"}], "test": [{"shape": "circle"}]}
 ARENA = {
@@ -33,7 +31,7 @@ COLOURS = {"computed torque": "red"}
 def driven():
     """A plan with a circle among obstacles, and an episode of a controller on it."""
     settings = parse(TaskSettings, {**PATHS, "environment": "follow", "arena": ARENA}, "task")
-    batch = test_batch(settings, settings.test, starts=1)
+    batch = evaluation_batch(settings, settings.test, starts=1)
     engine, task = bare(batch).engine, bare(batch).task
     return engine.plan, {
         "computed torque": roll_out(ComputedTorque(engine.layout, 10.0, task.control_period), batch, 3)

@@ -2,6 +2,7 @@
 
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -16,7 +17,7 @@ from caster_gym.tasks.follow.parameters import FollowParameters
 from caster_gym.tasks.track.parameters import TrackParameters
 
 CONFIGS = Path(str(files("caster_gym.configs")))
-PATHS = {
+PATHS: dict[str, Any] = {
     "train": [{"shape": "random_paths", "seed": 0}],
     "validation": [{"shape": "random_paths", "seed": 1}],
     "test": [{"shape": "circle"}],

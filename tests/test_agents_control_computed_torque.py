@@ -124,7 +124,7 @@ def test_what_the_controllers_know_of_the_robot():
     body = np.diag([robot.platform.mass, robot.platform.mass, robot.platform.inertia])
     assert_allclose(known_model(robot, "without wheels").inertia(steering), np.broadcast_to(body, (20, 3, 3)))
     with pytest.raises(ValueError, match="known must be 'exact', 'without D1' or 'without wheels', got 'half'"):
-        known_model(robot, "half")
+        known_model(robot, "half")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("robot", ["chung2008", "tidybot2"])

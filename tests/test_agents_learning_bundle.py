@@ -135,7 +135,7 @@ def test_the_actor_keeps_weights_of_its_own():
     kept = {name: tensor.clone() for name, tensor in actor.state_dict().items()}
     with torch.no_grad():
         for weight in learner.policy.parameters():
-            weight += 1.0
+            weight.add_(1.0)
     assert all(torch.equal(tensor, kept[name]) for name, tensor in actor.state_dict().items())
 
 
@@ -248,7 +248,7 @@ def test_a_failure_while_saving_leaves_the_old_bundle(tmp_path, monkeypatch, fai
     if failing == "save_file":
         monkeypatch.setattr(module, "save_file", fail)
     else:
-        monkeypatch.setattr(module.yaml, "safe_dump", fail)
+        monkeypatch.setattr(yaml, "safe_dump", fail)
     for target in (folder, tmp_path / "new"):
         with pytest.raises(OSError, match="no space left"):
             save_bundle(target, fresh_bundle(seed=2))

@@ -52,7 +52,7 @@ class Endings(BaseCallback):
 
     def __init__(self):
         super().__init__()
-        self.counts = Counter()
+        self.counts: Counter[str] = Counter()
 
     def _on_step(self):
         for done, info in zip(self.locals["dones"], self.locals["infos"], strict=True):

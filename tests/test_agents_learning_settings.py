@@ -2,7 +2,7 @@
 
 import pytest
 
-from caster_gym.agents.learning.settings import LinearSchedule, PPOSettings, scheduled
+from caster_gym.agents.learning.settings import LinearSchedule, PPOSettings, SACSettings, SHACSettings, scheduled
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, parse
 
@@ -42,11 +42,13 @@ def test_a_schedule_goes_from_its_start_to_its_end():
     """As Stable-Baselines3 counts: the share of the training that remains goes from 1 to 0, and may end below."""
     schedule = LinearSchedule(start=3e-3, end=1e-3)
     assert [schedule.at(remaining) for remaining in (1.0, 0.5, 0.0, -0.1)] == pytest.approx([3e-3, 2e-3, 1e-3, 1e-3])
-    falling = read_agent("ppo").learning_rate
+    ppo, constant = read_agent("ppo"), read_agent("ppo", {"learning_rate": 1e-4})
+    assert isinstance(ppo, PPOSettings) and isinstance(constant, PPOSettings)
+    falling = ppo.learning_rate
     assert [scheduled(falling, remaining) for remaining in (1.0, 0.25, 0.0)] == [7e-4, 0.25 * 7e-4, 0.0]
-    constant = read_agent("ppo", {"learning_rate": 1e-4}).learning_rate
-    assert scheduled(constant, 1.0) == scheduled(constant, 0.1) == 1e-4
+    assert [scheduled(constant.learning_rate, remaining) for remaining in (1.0, 0.1)] == [1e-4, 1e-4]
     changed = read_agent("shac", {"critic_learning_rate": {"start": 1e-2, "end": 1e-3}})
+    assert isinstance(changed, SHACSettings)
     assert scheduled(changed.critic_learning_rate, 0.0) == pytest.approx(1e-3)
 
 
@@ -68,4 +70,5 @@ def test_what_is_wrong_with_a_schedule_or_a_coefficient_is_named(content, messag
 
 @pytest.mark.parametrize("coefficient", ["auto", "auto_0.1", 0.1])
 def test_coefficients_of_the_entropy_are_those_of_stable_baselines(coefficient):
-    assert read_agent("sac", {"ent_coef": coefficient}).ent_coef == coefficient
+    settings = read_agent("sac", {"ent_coef": coefficient})
+    assert isinstance(settings, SACSettings) and settings.ent_coef == coefficient

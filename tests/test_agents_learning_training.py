@@ -57,8 +57,8 @@ class Finished(NamedTuple):
 
     folder: Path
     best: object
-    reports: list  # steps and verdict of each
-    threads: set  # of Torch and of the engine
+    reports: list[Any]  # steps and verdict of each
+    threads: set[Any]  # of Torch and of the engine
     restored: bool  # whether there were as many afterwards as before, 3 of Torch
 
 
@@ -221,8 +221,9 @@ def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     """
     task = read_settings(TaskSettings, "tasks", "track")
     settings = read_agent("ppo", {"n_timesteps": 600_000, "validations": 3})
+    assert isinstance(settings, PPOSettings)
     train(task, settings, 0, tmp_path, nothing)
-    batch = evaluation.test_batch(task, task.test, starts=1)
+    batch = evaluation.evaluation_batch(task, task.test, starts=1)
     episodes = roll_out(load_policy(tmp_path / "best").agent, batch, HELD_OUT_SEED)
     metrics = measure(episodes, 2.0)
     assert metrics.failed.size == 64

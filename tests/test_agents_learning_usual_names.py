@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from typing import Any
 
 import pytest
 import stable_baselines3
@@ -33,10 +34,11 @@ INTERNAL = {  # of SB3's constructors, which nobody sets from a command line
     "stats_window_size",
     "_init_setup_model",
 }
-RANDOM = {"shape": "random_paths"}
+RANDOM: Any = {"shape": "random_paths"}
 PATHS = {kind: [{**RANDOM, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
 AGENTS = {"agents": ["computed_torque"]}
-OPTIONS = {option for command in get_command(app).commands.values() for one in command.params for option in one.opts}
+GROUP: Any = get_command(app)
+OPTIONS = {option for command in GROUP.commands.values() for one in command.params for option in one.opts}
 
 
 def kind(agent):
@@ -134,7 +136,7 @@ def test_answers_name_fields_and_options_that_exist():
             assert set(re.findall(r"(--\w+)", answer)) <= OPTIONS, answer
 
 
-ELSEWHERE = {
+ELSEWHERE: dict[str, dict[str, Any]] = {
     "impact_law": {"arena": {"impact_law": "stronge"}},
     "restitution": {"arena": {"restitution": 0.5}},
     "impact_friction": {"arena": {"friction": 0.2}},
@@ -152,9 +154,9 @@ def test_keywords_that_belong_inside_of_another_are_sent_there(name):
     """And what is advised is accepted."""
     ((keyword, content),) = ELSEWHERE[name].items()
     with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}'") as error:
-        CasterTrackEnv(path=RANDOM, **{name: 1})
+        CasterTrackEnv(**{"path": RANDOM, name: 1})
     assert f"'{keyword}'" in str(error.value)
-    advised = yaml.safe_load(re.search(r"\{.*\}", str(error.value))[0])
+    advised = yaml.safe_load(re.findall(r"\{.*\}", str(error.value))[0])
     assert advised == content
     CasterTrackEnv(path=RANDOM, **{keyword: advised})
 
@@ -212,5 +214,5 @@ def test_usual_names_of_environments_get_an_answer(name):
     """In their constructors too, and what is advised is accepted."""
     here = TaskParameters.usual_names[name]
     with pytest.raises((TypeError, ValueError), match=f"it is called '{here}' here"):
-        CasterTrackEnv(path=RANDOM, **{name: 1})
+        CasterTrackEnv(**{"path": RANDOM, name: 1})
     CasterTrackEnv(path=RANDOM, **{here: TrackParameters().model_dump()[here]})

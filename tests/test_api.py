@@ -101,7 +101,8 @@ def test_what_is_imported_is_what_type_checkers_see():
     """Two lists say where a name comes from: one for the interpreter, one for mypy and editors."""
     tree = ast.parse(inspect.getsource(caster_gym))
     (checked,) = [node for node in tree.body if isinstance(node, ast.If)]
-    homes = {alias.name: line.module for line in checked.body for alias in line.names}
+    lines = [line for line in checked.body if isinstance(line, ast.ImportFrom)]
+    homes = {alias.name: line.module for line in lines for alias in line.names}
     assert homes == {**dict.fromkeys(MODULES, "caster_gym"), **caster_gym._HOMES}
 
 
@@ -128,7 +129,7 @@ def test_every_name_is_documented_by_an_example_that_runs(name, prepared, monkey
     examples = examples_of(name)
     assert examples is not None, f"the docstring of {name} has no example"
     monkeypatch.chdir(prepared)
-    said = []
+    said: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert runner.run(examples, out=said.append).failed == 0, "".join(said)
 

@@ -1,5 +1,7 @@
 """caster_gym.arena.arena and .outlines: reading arenas, and saying what is wrong with one."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +9,7 @@ from numpy.testing import assert_allclose
 from caster_gym.arena import Arena, read_arena
 from caster_gym.configuration import ConfigurationError
 
-FULL = {
+FULL: dict[str, Any] = {
     "room": [[-2, -1], [2, 1]],
     "half_planes": [{"point": [0.0, -3.0], "normal": [3.0, 4.0]}],
     "walls": [{"start": [0, 0], "end": [1, 0]}, {"start": [0, 0], "end": [0, 2], "thickness": 0.1}],

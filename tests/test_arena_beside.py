@@ -62,7 +62,7 @@ def test_obstacles_lie_on_both_sides():
         position = poses[:, 0] + 1j * poses[:, 1]
         for pillar in arena.pillars:
             away = complex(*pillar.centre) - position
-            k = min(np.abs(away).argmin(), len(position) - 2)
+            k = min(int(np.abs(away).argmin()), len(position) - 2)
             sides.append(np.sign((np.conj(position[k + 1] - position[k]) * away[k]).imag))
     assert {-1.0, 1.0} <= set(sides)
 

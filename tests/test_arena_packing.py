@@ -11,7 +11,7 @@ from caster_gym.mechanics.impulse import LAWS
 from caster_gym.robot import Footprint
 
 ROBOT = load_robot("chung2008")
-RADIUS = ROBOT.platform.footprint.disc
+RADIUS = ROBOT.platform.footprint.disc or 0.0
 PILLARS = read_arena({"pillars": [{"centre": [1, 2], "radius": 0.3}, {"centre": [-1, 0]}]})
 MIXED = read_arena(
     {
@@ -103,7 +103,8 @@ def test_distances_to_pillars_are_those_of_centres_less_both_radii():
     gaps, normals = distances(PILLARS, ROBOT, poses)
     apart = poses[..., None, :2] - [[1.0, 2.0], [-1.0, 0.0]]
     lengths = np.hypot(apart[..., 0], apart[..., 1])
-    assert_allclose(gaps, lengths - [0.3 + RADIUS, 0.1 + RADIUS], rtol=0.0, atol=1e-14)  # rounding of a few metres
+    both = np.array([0.3 + RADIUS, 0.1 + RADIUS])
+    assert_allclose(gaps, lengths - both, rtol=0.0, atol=1e-14)  # rounding of a few metres
     assert_allclose(normals, apart / lengths[..., None], rtol=0.0, atol=1e-13)  # the same, at a length above 0.1 m
 
 

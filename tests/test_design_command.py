@@ -76,7 +76,7 @@ def test_the_settings_stand_beside_the_results(report, folder):
 
 def test_the_command_leaves_all_or_nothing(tmp_path):
     settings = read_design("indoor", changes=CHANGES)
-    told = []
+    told: list[float] = []
     words = design(settings, tmp_path / "out", False, told.append)
     assert (tmp_path / "out" / "robot.yaml").is_file()
     assert told[-1] == 1.0

@@ -3,6 +3,7 @@
 from collections import Counter
 from itertools import combinations
 from math import comb
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ SINGULAR = 1e-12  # [-] rounding of lines of order 1
 BOTH_OF_TWO = ("roll_1", "steer_1", "roll_2", "steer_2")
 
 
-def with_casters(robot: Robot, *changes: dict) -> Robot:
+def with_casters(robot: Robot, *changes: dict[str, Any]) -> Robot:
     """The robot with fields of its casters changed, caster by caster."""
     casters = tuple(c.model_copy(update=change) for c, change in zip(robot.casters, changes, strict=True))
     return robot.model_copy(update={"casters": casters})
@@ -89,6 +90,7 @@ def test_every_somewhere_is_shown(seed):
     shown = [one for one in classify_all(robot) if one.singular == "somewhere"]
     assert len(shown) > 20
     for one in shown:
+        assert one.steering is not None
         assert smallest_singular_value(robot, one.steering, one.joints) < SINGULAR
         met = meeting(action_lines(robot, one.steering, one.joints), length)
         assert met.parallel == (one.point is None)

@@ -24,6 +24,7 @@ from caster_gym.design.search import (
     wheel_room,
 )
 from caster_gym.design.sizing import require
+from caster_gym.paths.shapes import Circle
 from caster_gym.robot import Robot
 from tests.random_robots import random_robot
 
@@ -53,14 +54,14 @@ def light():
 
 @pytest.fixture(scope="module")
 def strong():
-    shares = []
+    shares: list[float] = []
     design = optimise(ROBOT, STRONG, shares.append)
     return design, shares
 
 
 def allowed(count):
     """Radii and trails (K,) of a grid over the bounds, without those whose wheels could touch."""
-    radius, trail = (x.ravel() for x in np.meshgrid(*(np.linspace(*BOUNDS[name], count) for name in BOUNDS)))
+    radius, trail = (x.ravel() for x in np.meshgrid(*(np.linspace(low, high, count) for low, high in BOUNDS.values())))
     apart = radius + trail <= 0.0865  # half the distance of the pivots at x = ±0.0865
     return radius[apart], trail[apart]
 
@@ -253,7 +254,7 @@ def test_bounds_within_which_wheels_always_touch_are_refused():
 def test_wheels_within_the_room_that_a_message_names_do_not_touch():
     with pytest.raises(ValueError, match="must stay below") as error:
         Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (0.08, 0.1)}))
-    room = float(re.search(r"below ([\d.]+) m", str(error.value))[1])
+    room = float(re.findall(r"below ([\d.]+) m", str(error.value))[0])
     least = BOUNDS["radius"][0]
     assert Region.of(ROBOT, DesignTarget(**{**LIMITS, **BOUNDS, "trail": (room - least - 1e-9, 0.1)}))
 
@@ -275,7 +276,7 @@ def test_motors_that_are_too_slow_for_every_design_are_refused():
     target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "use", "speed": 20.0})
     with pytest.raises(ValueError, match=r"no design within the bounds reaches the target.* would do") as error:
         optimise(ROBOT, target)
-    factor = float(re.search(r"motors (\S+) times as fast", str(error.value))[1])
+    factor = float(re.findall(r"motors (\S+) times as fast", str(error.value))[0])
     content = ROBOT.model_dump()
     for caster in content["casters"]:
         for joint in ("roll", "steer"):
@@ -304,6 +305,6 @@ def test_bounds_of_which_a_part_is_sound_are_searched():
 
 
 def test_a_path_that_cannot_be_timed_is_refused_before_the_search():
-    target = DesignTarget(**LIMITS, **BOUNDS, paths=[{"shape": "circle", "duration": 1e-4}])
+    target = DesignTarget(**LIMITS, **BOUNDS, paths=(Circle(duration=1e-4),))
     with pytest.raises(ValueError, match="a path needs at least 10"):
         check_designable(ROBOT, target)

@@ -18,11 +18,13 @@ from caster_gym.design.sizing import (
 )
 from caster_gym.design.target import Target
 from caster_gym.paths.feasibility import motor_use
+from caster_gym.paths.random_paths import RandomPaths
+from caster_gym.paths.shapes import Circle, RoundedSquare
 
 ROBOT = load_robot("chung2008")
 LIMITS: dict[str, Any] = {"speed": 1.0, "yaw_rate": 2.0, "acceleration": 1.0, "yaw_acceleration": 3.0}
 GENTLE: dict[str, Any] = {"speed": 0.05, "yaw_rate": 0.1, "acceleration": 0.02, "yaw_acceleration": 0.05}
-PATHS = ({"shape": "circle", "duration": 6.0}, {"shape": "rounded_square"}, {"shape": "random_paths", "count": 4})
+PATHS = (Circle(duration=6.0), RoundedSquare(), RandomPaths(count=4))
 FEW = sampled_motions(3, 64)
 
 

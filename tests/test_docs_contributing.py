@@ -24,6 +24,7 @@ def recipe(title, language):
     """The first block of code of a section."""
     section = TEXT[TEXT.index(f"## {title}\n") :]
     block = re.search(rf"^ *```{language}\n(.*?)^ *```", section, re.M | re.S)
+    assert block is not None
     return textwrap.dedent(block[1])
 
 

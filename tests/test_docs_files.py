@@ -7,6 +7,8 @@ import pytest
 
 from caster_gym.paths import read_paths
 from caster_gym.paths.files import POINT, TIME
+from caster_gym.paths.splines import Spline
+from caster_gym.paths.timed import Timed
 from caster_gym.units import UNITS, read_unit
 
 PAGE = (Path(__file__).parents[1] / "docs" / "files.md").read_text(encoding="utf-8")
@@ -25,8 +27,8 @@ def test_every_example_is_read_as_promised(tmp_path, name, shape, count):
     for file, text in EXAMPLES.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     (path,) = read_paths(tmp_path / name)
-    assert path.shape == shape
-    assert len(path.waypoints if shape == "spline" else path.poses) == int(count)
+    assert isinstance(path, Spline | Timed) and path.shape == shape
+    assert len(path.waypoints if isinstance(path, Spline) else path.poses) == int(count)
     assert path.trajectories(0.02)
 
 
@@ -43,8 +45,8 @@ def test_the_units_of_the_page_are_those_that_are_read():
 
 
 def test_the_names_of_the_page_are_those_that_are_read():
-    times = re.search(r"^\| `time` \| (.*) \|$", PAGE, re.M)[1]
-    points = re.search(r"^\| `x`, `y` \| (.*?);", PAGE, re.M)[1]
+    times = re.findall(r"^\| `time` \| (.*) \|$", PAGE, re.M)[0]
+    points = re.findall(r"^\| `x`, `y` \| (.*?);", PAGE, re.M)[0]
     assert {name.strip("` ").replace(".", "_") for name in times.split(",")} <= set(TIME.names)
     assert {name.strip() for name in points.split(",")} <= set(POINT["x"].names)
 

@@ -1,6 +1,7 @@
 """Recycled arrays: never one that somebody still holds, and few that nobody holds."""
 
 import weakref
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -25,7 +26,8 @@ def test_an_array_comes_back_once_nobody_holds_it():
 
 def test_whatever_looks_at_an_array_keeps_it():
     """Views, views of views, tensors and buffers all hold the array they show."""
-    for look in (lambda a: a[1], lambda a: a.T[:2].reshape(-1), torch.from_numpy, memoryview):
+    looks: tuple[Any, ...] = (lambda a: a[1], lambda a: a.T[:2].reshape(-1), torch.from_numpy, memoryview)
+    for look in looks:
         pool = BufferPool((2, 2), np.float64)
         seen = look(pool.take())
         other = pool.take()

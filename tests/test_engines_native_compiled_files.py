@@ -150,6 +150,7 @@ def test_a_version_that_is_read_stays_young(root):
 def test_a_turn_waits_for_the_one_before(tmp_path):
     """on_waiting ends the first one, without which the second would never come."""
     first = take_turn(tmp_path / "turn", pytest.fail)
+    assert first is not None
     waited = []
 
     def on_waiting():
@@ -157,14 +158,17 @@ def test_a_turn_waits_for_the_one_before(tmp_path):
         first.end()
 
     second = take_turn(tmp_path / "turn", on_waiting)
-    assert waited == [True]
+    assert waited == [True] and second is not None
     second.end()
-    take_turn(tmp_path / "turn", pytest.fail).end()
+    third = take_turn(tmp_path / "turn", pytest.fail)
+    assert third is not None
+    third.end()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_whoever_is_stuck_does_not_stop_others_for_ever(tmp_path, monkeypatch):
     first = take_turn(tmp_path / "turn", pytest.fail)
+    assert first is not None
     monkeypatch.setattr(turns, "LONGEST_WAIT", 0.0)
     assert take_turn(tmp_path / "turn", lambda: None) is None
     first.end()

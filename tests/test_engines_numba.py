@@ -111,7 +111,8 @@ def test_the_number_of_threads_changes_no_bit(threads):
         fleet.step(torques, STEP, 20)
         states.append(fleet.state)
     set_threads(before)
-    assert_array_equal(*states)
+    first, second = states
+    assert_array_equal(first, second)
 
 
 def test_many_steps_equal_single_ones():

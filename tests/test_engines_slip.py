@@ -1,6 +1,7 @@
 """A floor of finite friction in the engines: native, tensor and NumPy, one robot and many."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -174,18 +175,19 @@ def test_engines_take_floors_as_environments_do(floor):
     ends = []
     for make in (Fleet, TorchFleet):
         for given in (floor, checked):
-            fleet = make(robot, 1, floor=given, **({"dtype": torch.float64} if make is TorchFleet else {}))
+            precise: dict[str, Any] = {"dtype": torch.float64} if make is TorchFleet else {}
+            fleet = make(robot, 1, floor=given, **precise)
             fleet.state = state if make is Fleet else torch.as_tensor(state)
             fleet.step(torque if make is Fleet else torch.as_tensor(torque), STEP, 3)
             ends.append(np.array(fleet.state))
-        assert_array_equal(*ends[-2:])
+        assert_array_equal(ends[-1], ends[-2])
         assert make(robot, 1, floor="grip").state.shape == make(robot, 1).state.shape == (1, 13)
         with pytest.raises(ConfigurationError, match="the floor: unknown key 'mu'; it is called 'friction' here"):
             make(robot, 1, floor={"mu": 0.3})
     model, plain = Model(robot), angles_of(state, 3)
-    walks = [model.simulate(plain, torque, STEP, 3, floor=given) for given in (floor, checked)]
-    assert_array_equal(*walks)
-    assert walks[0].shape == (4, 1, 15)
+    one, other = (model.simulate(plain, torque, STEP, 3, floor=given) for given in (floor, checked))
+    assert_array_equal(one, other)
+    assert one.shape == (4, 1, 15)
     assert model.simulate(plain, torque, STEP, 3, floor="grip").shape == (4, 1, 9)
     with pytest.raises(ConfigurationError, match="floor must be 'grip' or a mapping such as"):
         model.simulate(plain, torque, STEP, 3, floor="ice")

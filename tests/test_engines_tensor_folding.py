@@ -1,5 +1,7 @@
 """Zeros are taken out of what Torch compiles, and nothing else changes."""
 
+from typing import Any
+
 import torch
 from numpy.testing import assert_array_equal
 
@@ -10,7 +12,7 @@ X, Y = torch.linspace(-2.0, 3.0, 7), torch.linspace(1.0, 4.0, 7)
 
 def folded(function, *arguments):
     """What a function gives after the pass, and the arithmetic that is left of it."""
-    left = []
+    left: list[Any] = []
 
     def backend(module, _):
         Folding()(module.graph)

@@ -24,8 +24,8 @@ def test_each_robot_moves_as_if_it_were_alone(casters):
     turned = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     bodies = np.concatenate([rng.normal(size=(2, ROBOTS)), turned[0], rng.normal(size=(3, ROBOTS)), *turned[1:]])
     commands, push = rng.uniform(-1.0, 1.0, (2 * casters, ROBOTS)), rng.normal(size=(3, ROBOTS))
-    given = (torch.as_tensor(rows) for rows in (bodies, commands, push))
-    end, done, asks = driven_rows(*given, STEP, robot, asking=True)
+    states, torques, wrenches = (torch.as_tensor(rows) for rows in (bodies, commands, push))
+    end, done, asks = driven_rows(states, torques, wrenches, STEP, robot, asking=True)
     for i in range(ROBOTS):
         state, wanted = unpack_state(tuple(bodies[:, i].tolist())), pairs(tuple(commands[:, i].tolist()))
         alone, drive = driven_step(state, wanted, tuple(push[:, i].tolist()), STEP, robot)

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import torch
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.engines.native.fleet import Fleet
@@ -179,7 +180,7 @@ def test_stiff_robots_are_refused_by_every_engine(case):
         lambda: TorchModel(robot).simulate(np.zeros(6 + n), torque, 0.005, 1),
         lambda: Fleet(robot).step(torque[None], 0.005),
         lambda: Fleet([load_robot(robot.name), robot]).step(np.zeros((2, 2 * n)), 0.005),
-        lambda: TorchFleet(robot).step(torque[None], 0.005),
+        lambda: TorchFleet(robot).step(torch.as_tensor(torque[None]), 0.005),
         lambda: CasterTrackEnv(robot, PATH),
         lambda: CasterTrackVectorEnv(3, robot=robot, path=PATH),
         lambda: TorchVectorEnv("track", 3, robot=robot, path=PATH),
@@ -195,7 +196,7 @@ def test_the_number_of_substeps_that_a_refusal_names_would_do(case):
     robot = STIFF[case]
     with pytest.raises(ValueError, match="'substeps' of") as caught:
         CasterTrackEnv(robot, PATH)
-    count = int(re.search(r"'substeps' of (\d+) would do, in place of 4", str(caught.value)).group(1))
+    count = int(re.findall(r"'substeps' of (\d+) would do, in place of 4", str(caught.value))[0])
     with pytest.raises(ValueError, match="cannot follow"):
         CasterTrackEnv(robot, PATH, substeps=count - 1)
     greatest = []
@@ -222,12 +223,12 @@ def test_where_no_number_of_substeps_would_do_something_else_is_named_that_does(
     robot = changed("chung2008", roll_max_torque=1e6)
     with pytest.raises(ValueError, match="more than a task may have") as caught:
         CasterTrackEnv(robot, PATH)
-    found = re.search(
+    ((torque, period),) = re.findall(
         r"'roll.max_torque' of at most (\S+) N m in every caster or a 'control_period' of (\S+) s in 1000 'substeps'",
         str(caught.value),
     )
-    CasterTrackEnv(changed("chung2008", roll_max_torque=float(found.group(1))), PATH)
-    CasterTrackEnv(robot, {"shape": "circle", "radius": 0.5}, control_period=float(found.group(2)), substeps=1000)
+    CasterTrackEnv(changed("chung2008", roll_max_torque=float(torque)), PATH)
+    CasterTrackEnv(robot, {"shape": "circle", "radius": 0.5}, control_period=float(period), substeps=1000)
 
 
 def test_the_number_to_blame_is_named():
@@ -282,7 +283,7 @@ def test_features_that_could_make_a_robot_stiff_are_refused_with_substeps_that_d
 
     with pytest.raises(ValueError, match="features may make them") as caught:
         made()
-    env = made(substeps=int(re.search(r"'substeps' of (\d+) would do", str(caught.value)).group(1)))
+    env = made(substeps=int(re.findall(r"'substeps' of (\d+) would do", str(caught.value))[0]))
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(200):

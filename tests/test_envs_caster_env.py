@@ -4,6 +4,7 @@ import copy
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import cloudpickle
@@ -28,18 +29,18 @@ FEATURES = (
     Potential(quantity="position_error", margin=0.5, discount=0.97),
     Smoothness(),
 )
-WAYS = {
+WAYS: dict[str, Callable[[Any], Any]] = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
     "pickle": lambda env: pickle.loads(pickle.dumps(env)),
     "cloudpickle": lambda env: pickle.loads(cloudpickle.dumps(env)),
 }
-SINGLE = {
+SINGLE: dict[str, Callable[..., Any]] = {
     "track": lambda **how: CasterTrackEnv(**TASK, **how),
     "follow": lambda **how: CasterFollowEnv(**ARENA, **how),
     "wrapped": lambda **how: wrap(CasterFollowEnv(**TASK, **how), *FEATURES),
 }
-BATCHES = {
+BATCHES: dict[str, Callable[..., Any]] = {
     "tracks": lambda **how: CasterTrackVectorEnv(3, max_episode_steps=12, **TASK, **how),
     "follows": lambda **how: CasterFollowVectorEnv(3, max_episode_steps=12, **ARENA, **how),
     "wrapped batch": lambda **how: wrap(CasterFollowVectorEnv(3, max_episode_steps=12, **TASK, **how), *FEATURES),

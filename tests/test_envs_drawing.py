@@ -19,6 +19,7 @@ from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVector
 
 PATH = {"shape": "circle", "radius": 0.5}
 SINGLE, BATCH = [CasterFollowEnv, CasterTrackEnv], [CasterFollowVectorEnv, CasterTrackVectorEnv]
+EVERY = [*SINGLE, *BATCH]
 
 pytestmark = pytest.mark.usefixtures("no_display")
 
@@ -35,7 +36,7 @@ def started(kind, render_mode="rgb_array", **arguments):
     return env
 
 
-@pytest.mark.parametrize("kind", SINGLE + BATCH)
+@pytest.mark.parametrize("kind", EVERY)
 def test_an_unknown_render_mode_is_refused(kind):
     known = r"render_mode must be None or one of \['human', 'rgb_array'(, 'grid')?\], got 'ascii'"
     with pytest.raises(ValueError, match=known):
@@ -51,7 +52,7 @@ def test_gymnasiums_check_includes_drawing(kind):
         check_env(gym.make(f"caster_gym:{name}-v0", path=PATH, render_mode="rgb_array").unwrapped)
 
 
-@pytest.mark.parametrize("kind", SINGLE + BATCH)
+@pytest.mark.parametrize("kind", EVERY)
 def test_drawing_before_the_first_reset_is_refused(kind):
     env = kind(path=PATH, render_mode="rgb_array")
     with pytest.raises(RuntimeError, match=r"reset (the environment|every robot) before (it is|they are) drawn"):
@@ -96,7 +97,7 @@ def test_a_batch_draws_each_robot_as_its_single_environment(kind, single):
     paths = {"path": [PATH, "lemniscate"], "render_mode": "rgb_array"}
     ours, theirs, alone = kind(3, **paths), SyncVectorEnv([lambda: single(**paths)] * 3), kind(1, **paths)
     for env in (ours, theirs, alone):
-        env.reset(seed=[0, 1, 0][: env.num_envs], options={"path": 0})
+        env.reset(seed=list[int | None]([0, 1, 0][: env.num_envs]), options={"path": 0})
     for step in range(6):
         action = np.full((3, 6), 0.1 * step, dtype=np.float32)
         for env in (ours, theirs, alone):
@@ -160,6 +161,7 @@ def test_gymnasium_shows_a_batch(monkeypatch):
     env = HumanRendering(gym.make_vec("caster_gym:CasterFollow-v0", num_envs=4, path=PATH, render_mode="rgb_array"))
     env.reset(seed=0)
     env.step(np.full((4, 6), 0.3, dtype=np.float32))
+    assert env.window is not None
     shown = pygame.surfarray.array3d(env.window)
     assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 10
     env.close()
@@ -179,14 +181,14 @@ def test_drawing_goes_on_after_somebody_has_quit_pygame():
     assert (env.render() != before).any()
 
 
-@pytest.mark.parametrize("kind", SINGLE + BATCH)
+@pytest.mark.parametrize("kind", EVERY)
 def test_without_a_render_mode_nothing_is_drawn(kind):
     env = started(kind, None)
     with pytest.warns(UserWarning, match="render.. draws nothing without a render_mode"):
         assert env.render() is None
 
 
-@pytest.mark.parametrize("kind", SINGLE + BATCH)
+@pytest.mark.parametrize("kind", EVERY)
 def test_closing_twice_is_closing_once(kind):
     """Before anything was drawn, and after."""
     for drawn in (False, True):
@@ -197,7 +199,7 @@ def test_closing_twice_is_closing_once(kind):
         env.close()
 
 
-@pytest.mark.parametrize("kind", SINGLE + BATCH)
+@pytest.mark.parametrize("kind", EVERY)
 def test_a_window_is_no_image(kind):
     """It draws itself at reset and step; render() returns nothing then."""
     env = started(kind, "human")

@@ -5,6 +5,7 @@ import json
 import pickle
 import re
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -123,10 +124,10 @@ def test_the_floor_gives_no_more_than_its_friction():
         info = env.step(action)[4]
         uses.append(info["traction_use"])
         slips.append(info["wheel_slip"].max())
-    uses, slips = np.array(uses), np.array(slips)
-    assert uses.max() <= 1.0 + ROUNDING
-    assert (slips >= 0.0).all() and slips.max() > 0.1
-    assert_allclose(uses[slips > 1e-6], 1.0, rtol=1e-9)  # a sliding wheel takes what the floor can give
+    used, slipped = np.array(uses), np.array(slips)
+    assert used.max() <= 1.0 + ROUNDING
+    assert (slipped >= 0.0).all() and slipped.max() > 0.1
+    assert_allclose(used[slipped > 1e-6], 1.0, rtol=1e-9)  # a sliding wheel takes what the floor can give
 
 
 def test_no_wheel_slips_below_the_floors_limit():
@@ -271,11 +272,11 @@ def test_states_can_be_put_back():
 
 
 def test_the_floor_stands_in_the_specification():
-    env = gym.make("caster_gym:CasterTrack-v0", path=PATHS, floor=ISLANDS)
+    env: Any = gym.make("caster_gym:CasterTrack-v0", path=PATHS, floor=ISLANDS)
     told = json.loads(env.spec.to_json())["kwargs"]["floor"]
     assert told == ISLANDS
-    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json())).unwrapped
-    assert again.task == env.unwrapped.task
+    again: Any = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.task == env.unwrapped.task
 
 
 @pytest.mark.parametrize("kind", [TrackParameters, FollowParameters])

@@ -1,5 +1,7 @@
 """What the robot asks of the floor: traction, lifted wheels and drawn forces, whatever pushes it."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -124,7 +126,7 @@ def test_drawn_forces_of_the_floor_hold_a_robot_that_leans_on_a_wall():
     c, s = scene.pose[2:]
     in_world = np.array([c * floor[0] - s * floor[1], s * floor[0] + c * floor[1]])
     wall = info["impulse"] / env.task.control_period
-    assert_allclose(in_world, -wall, atol=0.02 * np.linalg.norm(wall))  # it still creeps and turns a little
+    assert_allclose(in_world, -wall, atol=0.02 * float(np.linalg.norm(wall)))  # it still creeps and turns a little
     pull = np.linalg.norm(scene.ground_forces, axis=1) / (
         robot.floor_friction * Model(robot).wheel_loads(angles(env.engine.states[0]))
     )
@@ -136,7 +138,7 @@ def test_lifted_wheels_are_counted_alone_and_in_a_batch():
     robot = standing_high(load_robot("xr4000"), 0.3)
     mass = mass_of(robot)
     alone = CasterTrackEnv(robot, "circle")
-    batch = gym.make_vec("caster_gym:CasterTrack-v0", num_envs=3, robot=robot, path="circle").unwrapped
+    batch: Any = gym.make_vec("caster_gym:CasterTrack-v0", num_envs=3, robot=robot, path="circle").unwrapped
     alone.reset(seed=0)
     batch.reset(seed=0)
     for share, lifted in ((0.0, 0), (2.0, 1)):

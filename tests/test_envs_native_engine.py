@@ -50,7 +50,8 @@ def steering(state):
 
 def random_places(count):
     """Near the path, where the robot's disc of 0.15 m is free of everything."""
-    rng, places = np.random.default_rng(1), []
+    rng = np.random.default_rng(1)
+    places: list[Any] = []
     arena, robot = read_arena(ARENA), load_robot("chung2008")
     while len(places) < count:
         pose = np.array([*rng.uniform(-0.9, 0.9, 2), rng.uniform(-np.pi, np.pi)])

@@ -1,5 +1,7 @@
 """What the environments tell of their paths."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -12,8 +14,8 @@ RECORDED = {"shape": "spline", "waypoints": np.column_stack([T, np.sin(T)]).roun
 
 @pytest.mark.parametrize("task", ["CasterTrack-v0", "CasterFollow-v0"])
 def test_environments_tell_what_was_made_of_their_waypoints(task):
-    single = gym.make(f"caster_gym:{task}", path=["circle", RECORDED])
-    batch = gym.make_vec(f"caster_gym:{task}", num_envs=2, path=["circle", RECORDED])
+    single: Any = gym.make(f"caster_gym:{task}", path=["circle", RECORDED])
+    batch: Any = gym.make_vec(f"caster_gym:{task}", num_envs=2, path=["circle", RECORDED])
     told = single.unwrapped.path_descriptions
     assert told == batch.unwrapped.path_descriptions
     assert told[0] == "circle"

@@ -18,7 +18,7 @@ from caster_gym.paths.shapes import Circle, Lemniscate
 from caster_gym.wrappers import Payload, SensorNoise, wrap
 
 ROBOT = load_robot("chung2008")
-OBJECTS = {
+OBJECTS: dict[str, dict[str, Any]] = {
     "robot": {"robot": load_robot("tidybot2")},
     "path": {"path": Circle(radius=0.5)},
     "paths": {"path": (Circle(radius=0.5), "lemniscate", {"shape": "circle", "radius": np.float64(0.4)})},
@@ -36,8 +36,8 @@ OBJECTS = {
 
 @pytest.mark.parametrize("given", list(OBJECTS))
 def test_a_specification_with_objects_makes_the_same_environment_again(given):
-    env = gym.make("caster_gym:CasterTrack-v0", **OBJECTS[given])
-    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    env: Any = gym.make("caster_gym:CasterTrack-v0", **OBJECTS[given])
+    again: Any = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert_array_equal(env.reset(seed=3)[0], again.reset(seed=3)[0])
     assert again.unwrapped.robot == env.unwrapped.robot
     assert again.unwrapped.task == env.unwrapped.task
@@ -46,7 +46,7 @@ def test_a_specification_with_objects_makes_the_same_environment_again(given):
 
 @pytest.mark.parametrize("given", list(OBJECTS))
 def test_so_does_that_of_a_batch(given):
-    env = gym.make_vec(
+    env: Any = gym.make_vec(
         "caster_gym:CasterTrack-v0", num_envs=3, autoreset_mode=AutoresetMode.SAME_STEP, **OBJECTS[given]
     )
     again = gym.make_vec(EnvSpec.from_json(env.spec.to_json()))
@@ -57,15 +57,17 @@ def test_so_does_that_of_a_batch(given):
 
 def test_so_does_that_of_an_environment_with_features():
     """A wrapper of Gymnasium records what it was given."""
-    env = wrap(gym.make("caster_gym:CasterTrack-v0", robot=ROBOT), Payload(mass=(0.0, 2.0)), SensorNoise(position=0.01))
-    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    features = Payload(mass=(0.0, 2.0)), SensorNoise(position=0.01)
+    env: Any = wrap(gym.make("caster_gym:CasterTrack-v0", robot=ROBOT), *features)
+    again: Any = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert_array_equal(env.reset(seed=3)[0], again.reset(seed=3)[0])
     assert again.features == env.features
 
 
 def test_what_was_given_in_plain_values_stays():
     given: dict[str, Any] = {"path": [{"shape": "circle", "radius": 0.5}], "corridor": 0.4}
-    assert gym.make("caster_gym:CasterTrack-v0", **given).spec.kwargs == given
+    env: Any = gym.make("caster_gym:CasterTrack-v0", **given)
+    assert env.spec.kwargs == given
 
 
 def test_plain_values_are_those_of_json():

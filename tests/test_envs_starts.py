@@ -183,8 +183,9 @@ def test_some_robots_of_a_batch_start_where_it_is_said(place):
 def test_time_limits_count_from_the_reset():
     """A batch as Gymnasium's wrapper, wherever along its trajectory an episode has begun; the next one as usual."""
     batch = CasterTrackVectorEnv(2, max_episode_steps=4, autoreset_mode="SameStep", **CIRCLE)
-    single = TimeLimit(CasterTrackEnv(**CIRCLE), 4)
-    duration = (len(single.unwrapped.engine.plan.tables[0]) - 1) * 0.02
+    alone = CasterTrackEnv(**CIRCLE)
+    single = TimeLimit(alone, 4)
+    duration = (len(alone.engine.plan.tables[0]) - 1) * 0.02
     times = np.array([1.0, duration - 0.04])  # which ends with the trajectory, two control periods later
     batch.reset(seed=SEED, options={"time": times})
     still = np.zeros((2, 6), dtype=np.float32)
@@ -261,7 +262,7 @@ def test_the_farthest_place_that_a_message_names_is_taken(place, path):
     env = KINDS[place][0](path={"shape": "circle", **path})
     with pytest.raises(ValueError, match="must lie in 0") as error:
         env.reset(seed=SEED, options={place: 99.0})
-    env.reset(seed=SEED, options={place: float(re.search(r"0 … ([\d.]+) ", str(error.value))[1])})
+    env.reset(seed=SEED, options={place: float(re.findall(r"0 … ([\d.]+) ", str(error.value))[0])})
 
 
 def test_which_robot_of_a_batch_starts_outside_is_told():

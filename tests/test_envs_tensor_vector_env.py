@@ -1,5 +1,7 @@
 """caster_gym.envs.tensor.vector_env: the episodes of the compiled batch, on tensors."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ OBSTACLES = {
 }
 
 
-def both(task, count, dtype=torch.float64, **arguments):
+def both(task, count, dtype=torch.float64, **arguments) -> tuple[Any, TorchVectorEnv]:
     """The compiled batch, and ours."""
     arguments = {"path": PATHS, "max_episode_steps": LONGEST, **arguments}
     mode = AutoresetMode.SAME_STEP
@@ -63,7 +65,7 @@ def assert_same_episodes(theirs, ours, steps, speed=0.0):
     states[:, 5] = speed * np.where(np.arange(len(states)) % 2, 1.0, -1.0)  # to the left and to the right
     theirs.engine.states, ours.states = states, torch.tensor(states)
     failures = ends = impacts = 0
-    for actions in random_actions(ours.num_envs, *ours.single_action_space.shape, steps):
+    for actions in random_actions(ours.num_envs, len(ours.robot.driven), steps):
         seen, rewards, terminated, truncated, infos = ours.step(torch.tensor(actions))
         expected, *others, told = theirs.step(actions)
         assert_allclose(seen, expected, rtol=1e-6, atol=1e-6)

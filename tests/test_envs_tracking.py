@@ -25,9 +25,9 @@ def test_full_torque_everywhere_is_an_effort_of_one():
     robot = random_robot(301, 3)
     for driven in (robot, robot.with_actuation(["roll_1", "steer_3"])):
         full = tuple(
-            tuple(
-                (1.0 if f"{kind}_{i}" in driven.driven else 0.0) * motor.max_torque
-                for kind, motor in (("roll", caster.roll), ("steer", caster.steer))
+            (
+                caster.roll.max_torque if f"roll_{i}" in driven.driven else 0.0,
+                caster.steer.max_torque if f"steer_{i}" in driven.driven else 0.0,
             )
             for i, caster in enumerate(driven.casters, start=1)
         )

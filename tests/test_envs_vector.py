@@ -194,7 +194,12 @@ def test_seeds_and_generators_are_those_of_gymnasiums_own_batch():
     """Tuples with one entry a robot, in the state that the resets have left them in."""
     ours, theirs = batch(3, AutoresetMode.DISABLED), singles(3, AutoresetMode.DISABLED)
     mask = np.array([False, True, False])
-    resets = [{"seed": 7}, {}, {"seed": [1, None, 3]}, {"seed": 20, "options": {"reset_mask": mask}}]
+    resets: list[dict[str, Any]] = [
+        {"seed": 7},
+        {},
+        {"seed": [1, None, 3]},
+        {"seed": 20, "options": {"reset_mask": mask}},
+    ]
     for how in resets:
         for env in (ours, theirs):
             env.reset(**copy.deepcopy(how))
@@ -301,7 +306,9 @@ def test_wrong_use_is_refused(call, error, message):
 def test_make_vec_gives_the_native_batch():
     env = gym.make_vec("caster_gym:CasterTrack-v0", num_envs=5, **TASK)
     assert isinstance(env.unwrapped, CasterTrackVectorEnv)
-    assert env.reset(seed=0)[0].shape == env.observation_space.shape == (5, env.single_observation_space.shape[0])
+    assert (
+        env.reset(seed=0)[0].shape == env.observation_space.shape == (5, *env.unwrapped.single_observation_space.shape)
+    )
     assert env.step(env.action_space.sample())[1].shape == (5,)
 
 

@@ -228,9 +228,10 @@ def test_the_drawn_platform_is_a_closed_surface_seen_from_outside():
     """Every edge belongs to two faces that run along it in opposite ways, and the volume is area times height."""
     robot = load_robot("tidybot2")
     model = compiled(robot)
-    text = ElementTree.fromstring(mjcf(robot, STEP)).find("asset/mesh")
-    faces = np.array(text.get("face").split(), dtype=int).reshape(-1, 3)
-    vertices = np.array(text.get("vertex").split(), dtype=float).reshape(-1, 3)
+    mesh = ElementTree.fromstring(mjcf(robot, STEP)).find("asset/mesh")
+    assert mesh is not None
+    faces = np.array(mesh.attrib["face"].split(), dtype=int).reshape(-1, 3)
+    vertices = np.array(mesh.attrib["vertex"].split(), dtype=float).reshape(-1, 3)
     edges = [(int(face[i]), int(face[(i + 1) % 3])) for face in faces for i in range(3)]
     assert len(set(edges)) == len(edges)
     assert {(b, a) for a, b in edges} == set(edges)

@@ -12,6 +12,7 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.configuration import ConfigurationError, Frozen, parse
 from caster_gym.design.command import read_design
 from caster_gym.file_names import FileName, NameOrFile, from_working_folder, is_file_name
+from caster_gym.paths.splines import Spline
 from caster_gym.shipped_files import read_settings
 
 CONFIGS = Path(str(files("caster_gym.configs")))
@@ -54,7 +55,7 @@ def project(tmp_path, monkeypatch):
 def test_files_that_name_one_another_are_found_from_anywhere(project, relative):
     start = Path("../project") if relative else project
     task = read_settings(TaskSettings, "tasks", str(start / "task.yaml"))
-    assert Path(task.robot).samefile(project / "robots" / "mine.yaml")
+    assert isinstance(task.robot, str) and Path(task.robot).samefile(project / "robots" / "mine.yaml")
     assert task.arena.pillars[0].centre == (30.0, 0.0)
     comparison = read_comparison(read_settings(BenchmarkSettings, "benchmarks", str(start / "comparison.yaml")))
     assert comparison.task == task
@@ -62,7 +63,8 @@ def test_files_that_name_one_another_are_found_from_anywhere(project, relative):
     target = read_design(str(start / "target.yaml"))
     assert Path(target.robot).samefile(project / "robots" / "mine.yaml")
     points = read_settings(TaskSettings, "tasks", str(start / "points.yaml")).test[0]
-    assert points.waypoints == target.paths[0].waypoints == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+    assert isinstance(points, Spline) and points == target.paths[0]
+    assert points.waypoints == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
 
 
 def test_what_was_read_means_the_same_in_another_file(project):

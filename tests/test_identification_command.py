@@ -25,7 +25,7 @@ from caster_gym.identification.recording_table import read_recording
 from caster_gym.identification.unknowns import unknowns
 from caster_gym.robot import load_robot
 from caster_gym.tasks.track.environment import CasterTrackEnv
-from caster_gym.wrappers import read_features, wrap
+from caster_gym.wrappers import MotorLag, SteeringOffset, read_features, wrap
 
 FILES = [".caster-gym", "features.yaml", "identified.csv", "identified.md", "identified.png", "robot.yaml", "run.yaml"]
 NAMES = ("payload_mass", "scrub")
@@ -120,6 +120,7 @@ def test_zeros_and_lag_are_features_that_wrappers_read(found, short):
     )
     text = features_yaml(told, short)
     offset, lag = read_features(yaml.safe_load(text))
+    assert isinstance(offset, SteeringOffset) and isinstance(lag, MotorLag)
     assert (offset.angle, offset.zeros, lag.time_constant) == (0.0, (0.0, 0.02, 0.0), 0.03)
     assert "# torque_delay: 0.004 s" in text
     none = read_features(yaml.safe_load(features_yaml(found, short)))

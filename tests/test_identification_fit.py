@@ -67,6 +67,7 @@ def test_a_recording_of_finer_time_steps_is_told_within_one_percent():
     truth, count, finer = {**LOAD, "trail": 0.027}, 126, 16
     robot = robot_with(CHUNG, truth)
     coarse = record(robot, 2.5, 0.02, seed=4)
+    assert coarse.twist is not None
     first = np.concatenate([coarse.pose[0], coarse.twist[0], coarse.steering[0]])
     held = np.repeat(coarse.torque[:-1], finer, axis=0)
     states = Model(robot).simulate(first, held, 0.02 / finer, len(held))[::finer]

@@ -120,6 +120,7 @@ def test_a_mistake_is_named_and_its_mend_is_accepted(drives, name, words, with_n
         recording = recording.noisy(USUAL, np.random.default_rng(0))
     wrong = MISTAKES[words](recording)
     found = contradiction(wrong, robot)
+    assert found is not None and found.mend is not None
     assert re.search(words, found.words)
     assert found.mend.advice in found.words
     check_recording(found.mend.mended(wrong), robot)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from caster_gym import load_robot
+from caster_gym.arena import Arena
 from scripts.speed_accuracy import measure_accuracy
 from scripts.speed_growth import field, growth_table, line, with_casters
 from scripts.speed_limits import Counted, limits_text, operations_of_a_step
@@ -64,7 +65,11 @@ def test_every_row_is_measured_in_every_turn_or_in_as_many_as_it_wants():
     order = []
 
     def row(key, turns=None):
-        return Row(key, key, "s", lambda: order.append(key) or float(len(order)), turns=turns)
+        def measured():
+            order.append(key)
+            return float(len(order))
+
+        return Row(key, key, "s", measured, turns=turns)
 
     measured = run([row("a"), row("b"), row("c", turns=1)], 3)
     assert {key: len(values) for key, values in measured.items()} == {"a": 3, "b": 3, "c": 1}
@@ -134,7 +139,7 @@ def test_casters_of_the_growing_robot_stand_on_a_circle():
 
 
 def test_fields_of_more_pillars_hold_those_of_fewer():
-    few, many = (set(field(count).pillars) for count in (4, 64))
+    few, many = (set(Arena.model_validate(field(count)).pillars) for count in (4, 64))
     assert field(0) is None
     assert few < many
     assert len(many) == 64

@@ -12,12 +12,12 @@ from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import make_learner
+from caster_gym.agents.learning.settings import PPOSettings, SHACSettings
+from caster_gym.agents.learning.training_run import Run
 from caster_gym.configuration import parse
 from caster_gym.tasks.track.metrics import TrackVerdict
 from scripts import measure_training
 from scripts.measure_training import (
-    FREE,
-    OURS,
     FreeVecEnv,
     main,
     rate_on_tensors,
@@ -27,7 +27,7 @@ from scripts.measure_training import (
     window_costs,
 )
 from scripts.training_busy import Beside, Round, busy_processes, section, train_beside
-from scripts.training_page import Course, Occasion, Point, Results, Trial, WindowCosts, page
+from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, page
 
 PATH = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3, "count": 2}
 CONTENT = {kind: [{**PATH, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
@@ -61,13 +61,19 @@ def test_episodes_of_free_robots_end_by_time():
         for robot, info in enumerate(infos):
             assert info.get("TimeLimit.truncated", False) == done[robot]
             if done[robot]:
-                np.testing.assert_array_equal(info["terminal_observation"], observations[robot])
+                np.testing.assert_array_equal(info["terminal_observation"], np.asarray(observations)[robot])
+
+
+def small_ppo():
+    settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
+    assert isinstance(settings, PPOSettings)
+    return settings
 
 
 @pytest.mark.slow
 def test_speeds_are_measured():
     """A smoke test."""
-    settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
+    settings = small_ppo()
     rows = share_rows(TASK, settings)
     assert [row.key for row in rows] == [OURS, FREE]
     assert all(row.measure() > 0.0 for row in rows)
@@ -82,8 +88,13 @@ def test_training_is_measured_in_pairs_beside_busy_processes(monkeypatch):
     """Each thread count as often as the other, and nothing is left running."""
     started = []
     popen = subprocess.Popen
-    monkeypatch.setattr(subprocess, "Popen", lambda *one, **more: started.append(popen(*one, **more)) or started[-1])
-    settings = read_learner("ppo", {}).model_copy(update={"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": (4,)})
+
+    def noted(*one, **more):
+        started.append(popen(*one, **more))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", noted)
+    settings = small_ppo()
     environment = SB3VecEnv(training_batch(TASK, 2))
     beside = train_beside(make_learner(settings, environment, seed=0), periods=16, pairs=2)
     assert sorted(one.threads for one in beside.rounds) == [1, 1, 2, 2]
@@ -176,13 +187,13 @@ def test_time_of_validations_is_left_out(monkeypatch):
     """With a clock that moves on in validations alone, training takes no time."""
     clock = [0.0]
     monkeypatch.setattr(measure_training, "processor_seconds", lambda: clock[0])
-    original = measure_training.Run.validate
+    original = Run.validate
 
     def slow_validation(self, actor):
         clock[0] += 100.0
         original(self, actor)
 
-    monkeypatch.setattr(measure_training.Run, "validate", slow_validation)
+    monkeypatch.setattr(Run, "validate", slow_validation)
     settings = read_learner(
         "ppo", {"n_envs": 2, "n_steps": 8, "batch_size": 8, "net_arch": [4], "n_timesteps": 48, "validations": 3}
     )
@@ -196,7 +207,9 @@ def test_learners_on_tensors_are_measured(monkeypatch):
     """A smoke test, uncompiled."""
     monkeypatch.setattr(measure_training, "WINDOWS", 1)
     fields = {"compile": False, "n_envs": 2, "net_arch": [4]}
-    costs = window_costs(TASK, read_learner("shac", {**fields, "n_steps": 2, "batch_size": 4}))
+    shac = read_learner("shac", {**fields, "n_steps": 2, "batch_size": 4})
+    assert isinstance(shac, SHACSettings)
+    costs = window_costs(TASK, shac)
     assert (costs.periods, costs.substeps) == (4, 2)
     assert min(costs[2:]) > 0.0
     ppo = read_learner("ppo_gpu", {**fields, "n_steps": 2, "batch_size": 4})

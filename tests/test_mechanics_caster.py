@@ -86,7 +86,7 @@ def test_drifts_are_the_joint_accelerations_at_constant_twist(robot):
     ours = np.array([rate_drifts(tuple(twist), f, c) for f, c in zip(directions, parameters.casters, strict=True)]).T
 
     turning = model.rates(steering, twist)[2]
-    _, exact = torch.func.jvp(lambda angle: model.rates(angle, twist), (torch.tensor(steering),), (turning,))
+    _, exact = torch.func.jvp(lambda angle: model.rates(angle, twist), (torch.tensor(steering),), (turning,))[:2]
     for drift, derivative in zip(ours, exact, strict=True):
         assert_allclose(drift, derivative, rtol=1e-12, atol=1e-10)  # rounding of terms of up to 1e3 rad/s²
 
@@ -107,11 +107,11 @@ def test_points_of_a_caster_move_as_its_rates_say(robot):
         for point in (wheel_centre, link_mass_centre):
             x, y = point(f, caster)
             turned = torch.tensor(angle)
-            _, speed = torch.func.jvp(
+            speed = torch.func.jvp(
                 lambda t, point=point, caster=caster: torch.stack(point((torch.cos(t), torch.sin(t)), caster)),
                 (turned,),
                 (torch.tensor(delta),),
-            )
+            )[1]
             assert_allclose(speed, [-delta * (y - caster.y), delta * (x - caster.x)], atol=ROUNDING)
         assert_allclose(
             np.subtract(wheel_centre(f, caster), (caster.x, caster.y)),

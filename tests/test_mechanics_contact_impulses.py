@@ -264,7 +264,7 @@ def test_rough_contacts_that_do_not_bounce_obey_coulombs_law():
         after, pressure, _ = struck(one)
         v_n, v_t = n @ after, t @ after
         edges = np.where(np.abs(v_t) > 1e-5, np.sign(v_t), 0.0)
-        high = np.where(v_n > 1e-5, 0.0, None)
+        high = np.where(v_n > 1e-5, 0.0, np.inf)
         k = len(n)
         # unknowns J_n, J_t and the greatest misfit; J_t = −μ sign(v_t) J_n where it slides
         cone = np.vstack([np.hstack([-one.mu * np.eye(k), sign * np.eye(k), np.zeros((k, 1))]) for sign in (1, -1)])
@@ -340,9 +340,11 @@ def test_a_robot_in_a_batch_is_struck_as_it_is_alone():
     walk = Walk(robot, around, together)
     after, _ = press(together, inertia(together.directions, walk.parameters), 0.5, walk.hull, walk.obstacles, 0, 2)
     for i in range(count):
+        position, heading, twist = (tuple(v[i : i + 1] for v in part) for part in together[:3])
         alone = State(
-            *((part[0][i : i + 1], part[1][i : i + 1]) for part in together[:2]),
-            tuple(v[i : i + 1] for v in together.twist),
+            position,
+            heading,
+            twist,
             tuple((c[i : i + 1], s[i : i + 1]) for c, s in together.directions),
         )
         single, _ = press(alone, inertia(alone.directions, walk.parameters), 0.5, walk.hull, walk.obstacles, 0, 2)

@@ -111,11 +111,11 @@ def energy_rate(robot: Robot, steering: np.ndarray, twist: np.ndarray, twist_rat
     """Derivative of the kinetic energy along the motion, by automatic differentiation. [W]"""
     model = TorchModel(robot)
     turning = model.rates(steering, twist)[2]
-    _, power = torch.func.jvp(
+    power = torch.func.jvp(
         model.kinetic_energy,
         (torch.tensor(steering), torch.tensor(twist)),
         (turning, torch.tensor(twist_rate)),
-    )
+    )[1]
     return float(power)
 
 

@@ -219,9 +219,9 @@ def test_impossible_impacts_are_refused(published):
             published.collide(steering, twist, point, [1.0, 0.0], wrong)
         with pytest.raises(ValueError, match="twist must "):
             published.collide(steering, wrong, point, [1.0, 0.0], 0.5)
-    for wrong in (-0.1, np.inf, np.nan):
-        with pytest.raises(ValueError, match=rf"friction must lie in 0 … 1e\+06, got {wrong}$"):
-            published.collide(steering, twist, point, [1.0, 0.0], 0.5, wrong)
+    for number in (-0.1, np.inf, np.nan):
+        with pytest.raises(ValueError, match=rf"friction must lie in 0 … 1e\+06, got {number}$"):
+            published.collide(steering, twist, point, [1.0, 0.0], 0.5, number)
     with pytest.raises(ValueError, match=r"normal must be a unit vector, got a length of 2"):
         published.collide(steering, twist, point, [2.0, 0.0], 0.5)
     with pytest.raises(ValueError, match=r"normal must be a unit vector, got a length of 0.5"):
@@ -253,6 +253,6 @@ def test_a_coarse_time_step_names_the_longest_that_would_do(published):
 
 def test_other_models_are_refused():
     with pytest.raises(ValueError, match='dynamics must be "exact" or "chung2008", got \'kim2001\''):
-        Model(load_robot("chung2008"), dynamics="kim2001")
+        Model(load_robot("chung2008"), dynamics="kim2001")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"dtype must be torch.float32 or torch.float64, got torch.int32"):
         TorchModel(load_robot("chung2008"), dtype=torch.int32)

@@ -24,9 +24,11 @@ def random_step(seed, h, outline=BOX):
     """Two ends of a fast time step, with casters in any direction."""
     rng = np.random.default_rng(seed)
     robot = shaped(random_robot(seed, 3), outline)
+    x, y = rng.uniform(-0.4, 0.4, 2)
     start = floats(
         state_of(
-            *rng.uniform(-0.4, 0.4, 2),
+            x,
+            y,
             rng.uniform(-3, 3),
             rng.uniform(-10, 10, 2),
             rng.uniform(-30, 30),
@@ -86,5 +88,5 @@ def test_no_contact_happens_in_the_time_that_is_free(seed, outline):
         # the last moment touches, up to rounding
         assert separation(*pose, hull, obstacles, 0).gap.min() > -1e-12
     if contact < h:
-        pose = tuple(value(p, contact) for p in (sweep.x, sweep.y, sweep.c, sweep.s))
-        assert separation(pose[:2], pose[2:], hull, obstacles, 0).gap < 2.0 * FOUND
+        x, y, c, s = (value(p, contact) for p in (sweep.x, sweep.y, sweep.c, sweep.s))
+        assert separation((x, y), (c, s), hull, obstacles, 0).gap < 2.0 * FOUND

@@ -1,5 +1,7 @@
 """Friction of the floor: the conditions of Coulomb's law, for single problems and along driven motions."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -37,7 +39,8 @@ def draw(seed, wheels):
         before = rng.normal(size=2) * rng.choice((0.0, 1e-3, 0.1, 2.0))
         free = before + rng.normal(size=2) * rng.choice((1e-3, 0.1, 0.5))
         rows = rng.normal(size=(2, 3))
-        footings.append(Footing(tuple(free), tuple(map(tuple, rows)), (k[0, 0], k[0, 1], k[1, 1])))
+        along, across = rows.tolist()
+        footings.append(Footing((free[0], free[1]), (tuple(along), tuple(across)), (k[0, 0], k[0, 1], k[1, 1])))
         limits.append(impulse_limit(1.0, rng.choice((0.0, 0.05, 0.5, 5.0)) * rng.uniform(0.5, 1.5)))
         slides.append(slide_ratio(tuple(before), limits[-1]))
     upper = tuple(inertia[np.triu_indices(3)])
@@ -142,7 +145,7 @@ ROBOTS += [random_robot(seed, count) for seed in range(2) for count in CASTER_CO
 
 def hard_problems(monkeypatch, h=5e-3):
     """All friction problems of robots that are driven far beyond what the floor holds, as a step meets them."""
-    met = []
+    met: list[Any] = []
 
     def first(change, caution, problem, slides):
         if not met or met[-1][1] is not problem:
@@ -176,7 +179,8 @@ def test_two_rounds_suffice_for_robots_that_slip_in_every_way(monkeypatch):
     for change, problem, slides in met:
         exact = solved(problem, slides, ROUNDS, change)
         found = solved(problem, slides, (0.5, 0.0), change)
-        left.append(np.abs(slips(*found, problem) - slips(*exact, problem)).max())
+        ours, theirs = (slips(change, grips, problem) for change, grips in (found, exact))
+        left.append(np.abs(ours - theirs).max())
     assert len(left) > 700
     assert np.median(left) < 1e-11  # [m/s]
     assert np.quantile(left, 0.99) < 3e-5

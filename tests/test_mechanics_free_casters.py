@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model
+from caster_gym.arrays import Array
 from caster_gym.mechanics.caster import rates as rolling_rates
 from caster_gym.mechanics.caster_masses import without_friction
 from caster_gym.mechanics.free_casters import (
@@ -88,7 +89,7 @@ def test_an_impulse_on_the_platform_leaves_the_momenta_of_the_casters(caster_cou
     assert energy == pytest.approx(0.5 * impulse @ change, rel=1e-13)
     for i, k in np.ndindex(caster_count, 2):  # the least energy that a twist can have: no rate could be better
         for way in (-1e-3, 1e-3):
-            moved = np.array(carried)
+            moved: Array = np.array(carried)
             moved[i, k] += way
             assert slip_energy(change, f, tuple(map(tuple, moved)), numbers) > energy
 
@@ -118,7 +119,7 @@ def test_wheels_that_are_held_answer_as_rolling_ones(seed, caster_count):
     answer = matrix(slip_inertia(f, numbers))
     for direction, caster in zip(f, numbers.casters, strict=True):
         own = own_inertia(without_friction(caster), caster)
-        rows = np.array(floor_rows(direction, border(direction, own, caster), caster))
+        rows: Array = np.array(floor_rows(direction, border(direction, own, caster), caster))
         answer = answer + rows.T @ np.linalg.solve(mobility(floor_mobility(own, caster)), rows)
     expected = Model(robot).inertia(steering)
     assert_allclose(answer, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())

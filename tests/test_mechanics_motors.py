@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
+from caster_gym.arrays import Array
 from caster_gym.mechanics.integration import rk4_step
 from caster_gym.mechanics.motors import joint_torques, motor_ranges, motor_speeds, motor_torques, torque_range
 from caster_gym.mechanics.parameters import robot_parameters
@@ -106,7 +107,8 @@ def test_power_is_the_mean_of_torque_times_speed(name):
         commands = tuple(map(tuple, rng.uniform(-1.0, 1.0, (robot.caster_count, 2)).tolist()))
         for h in (4e-3, 2e-3):
             _, drive = driven_step(state, commands, (0.0, 0.0, 0.0), h, parameters)
-            torques, now, powers = np.array(drive.torques), state, []
+            torques: Array = np.array(drive.torques)
+            now, powers = state, []
             at_joints = tuple(map(tuple, np.einsum("nij,ni->nj", gears, torques).tolist()))
             for _ in range(40):
                 middle = rk4_step(now, at_joints, (0.0, 0.0, 0.0), h / 80, parameters)

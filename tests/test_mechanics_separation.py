@@ -14,6 +14,7 @@ import caster_gym.engines.native.compiler
 import caster_gym.engines.tensor.model  # noqa: F401  teaches the choices and roots of tensors
 from caster_gym.arena import read_arena
 from caster_gym.arena.packing import hull_from, pack
+from caster_gym.arrays import Array
 from caster_gym.mechanics.separation import (
     TOUCH,
     Hull,
@@ -269,8 +270,8 @@ def test_flush_edges_touch_along_the_line_that_they_share(arena, ends):
     pose = ((0.0, 0.1), (1.0, 0.0))
     apart = separation(*pose, RECTANGLE, obstacles, 0)
     assert_allclose(apart, (0.0, 0.0, 1.0), rtol=0.0, atol=ROUNDING)
-    points = np.sort(np.array(contact_points(*pose, apart, RECTANGLE, obstacles, 0)), axis=0)
-    assert_allclose(points, [[ends[0], -0.1], [ends[1], -0.1]], rtol=0.0, atol=ROUNDING)
+    points: Array = np.array(contact_points(*pose, apart, RECTANGLE, obstacles, 0))
+    assert_allclose(np.sort(points, axis=0), [[ends[0], -0.1], [ends[1], -0.1]], rtol=0.0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("gap", [-0.02, 0.0, 0.04])

@@ -244,9 +244,11 @@ def test_the_floor_alone_changes_momentum(name):
     start = rolling(numbers, rng.uniform(-np.pi, np.pi, robot.caster_count), 0.7 * rng.uniform(-1.0, 1.0, 3))
     start = start._replace(rates=tuple(map(tuple, rng.uniform(-10.0, 10.0, (robot.caster_count, 2)))))
     for h in (2e-3, 1e-3):
-        rest, given = unexplained(*walk(start, none, 0.3, h, round(0.05 / h), numbers), h, numbers)
+        states, footfalls = walk(start, none, 0.3, h, round(0.05 / h), numbers)
+        rest, given = unexplained(states, footfalls, h, numbers)
         assert rest < 200.0 * h**2 * given  # (10 rad/s · h)² is 100 of it; 125 seen
-        rest, given = unexplained(*walk(start, none, 100.0, h, round(0.05 / h), numbers), h, numbers)
+        states, footfalls = walk(start, none, 100.0, h, round(0.05 / h), numbers)
+        rest, given = unexplained(states, footfalls, h, numbers)
         assert rest < 0.15 * given
 
 
@@ -271,12 +273,12 @@ def test_slip_starts_ends_and_turns_back_without_chatter(h, seed):
     push = 0.3 * GRAVITY * robot.platform.mass / 4
     forward = tuple((1.5 * push * caster.radius, 0.0) for caster in robot.casters)
     back = tuple((-roll, 0.0) for roll, _ in forward)
-    state, slips = aligned, []
+    state, rows = aligned, []
     for torques, steps in ((forward, 12), (((0.0, 0.0),) * 4, 25), (back, 12), (((0.0, 0.0),) * 4, 40)):
         states, footfalls = walk(state, torques, 0.3, h, steps, numbers)
         state = states[-1]
-        slips += [[u[0] for u in footfall.slips] for footfall in footfalls]
-    slips = np.array(slips)
+        rows += [[u[0] for u in footfall.slips] for footfall in footfalls]
+    slips = np.array(rows)
     held = np.abs(slips) < 1e-6
     signs = np.where(held, 0, np.sign(slips))
     changes = (np.diff(signs, axis=0) != 0).sum(axis=0)

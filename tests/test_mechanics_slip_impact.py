@@ -30,7 +30,7 @@ def met(name, seed, speed=0.5, turn=0.0, restitution=0.5, wall_friction=0.0):
     steering = rng.uniform(-np.pi, np.pi, robot.caster_count)
     f = tuple((float(np.cos(angle)), float(np.sin(angle))) for angle in steering)
     outline = robot.platform.footprint
-    front = outline.disc or max(x for x, _ in outline.polygon)
+    front = outline.disc or max(x for x, _ in outline.polygon or ())
     wall = Arena(
         half_planes=(HalfPlane(point=(front, 0.0), normal=(-1.0, 0.0)),),
         restitution=restitution,

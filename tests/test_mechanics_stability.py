@@ -54,7 +54,7 @@ def test_falloff_is_the_slope_of_full_torque(seed):
 
     def lost(twist):
         _, rolling, turning = model.rates(angles, twist)
-        torques = []
+        torques: list[float] = []
         for i, caster in enumerate(casters):
             speeds = motor_speeds((rolling[i], turning[i]), caster)
             chosen = [r[1] if s >= 0.0 else r[0] for r, s in zip(motor_ranges(speeds, caster), speeds, strict=True)]

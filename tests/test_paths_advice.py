@@ -9,6 +9,7 @@ from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import build_trajectories, read_paths
 from caster_gym.paths.course import build_courses
+from caster_gym.paths.splines import Spline
 
 ROBOT = load_robot("chung2008")
 PERIOD = 0.02  # [s] of the environments
@@ -66,7 +67,7 @@ def test_a_path_of_too_many_steps_is_accepted_once_it_is_as_short_as_its_message
     step = 0.0012345678
     with pytest.raises(ValueError, match="at most") as error:
         read_paths({"shape": "circle", "duration": 1e5})[0].trajectories(step)
-    longest = float(re.search(r"at most ([\d.]+) s would do", str(error.value)).group(1))
+    longest = float(re.findall(r"at most ([\d.]+) s would do", str(error.value))[0])
     assert read_paths({"shape": "circle", "duration": longest})[0].trajectories(step)
 
 
@@ -119,7 +120,7 @@ def test_a_course_is_made_once_its_message_is_followed(path):
 def test_a_spacing_that_was_asked_for_is_replaced_by_one_that_does(path):
     with pytest.raises(ValueError, match=r"a spacing of .* would do$") as error:
         build_courses(path, ROBOT, 1.0, spacing=0.02)
-    spacing = float(re.search(r"a spacing of ([\d.e-]+) m", str(error.value)).group(1))
+    spacing = float(re.findall(r"a spacing of ([\d.e-]+) m", str(error.value))[0])
     assert build_courses(path, ROBOT, 1.0, spacing=spacing)
 
 
@@ -134,7 +135,7 @@ def test_a_spacing_that_was_asked_for_is_replaced_by_one_that_does(path):
 def test_a_value_that_a_check_names_passes_the_check(path, pattern, field):
     with pytest.raises(ConfigurationError) as error:
         read_paths(path)
-    assert read_paths({**path, field: float(re.search(pattern, str(error.value)).group(1))})
+    assert read_paths({**path, field: float(re.findall(pattern, str(error.value))[0])})
 
 
 def test_a_round_course_may_have_laps_as_its_message_says():
@@ -156,7 +157,8 @@ def test_waypoints_that_zigzag_are_told_of_with_a_tolerance_that_smooths_them():
     t = np.linspace(0.0, 2.0, 300)
     points = np.column_stack([t, np.sin(t)]) + np.random.default_rng(8).normal(0.0, 0.0005, (300, 2))
     (noisy,) = read_paths(spline(*map(tuple, points.tolist())))
-    told = re.search(r"zigzag by about ([\d.]+) m: a tolerance of that", noisy.description).group(1)
+    assert isinstance(noisy, Spline)
+    told = re.findall(r"zigzag by about ([\d.]+) m: a tolerance of that", noisy.description)[0]
     slow, fast = (
         build_courses(one, ROBOT, 1.0)[0].duration
         for one in (noisy, noisy.model_copy(update={"tolerance": float(told)}))

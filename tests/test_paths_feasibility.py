@@ -1,6 +1,7 @@
 """caster_gym.paths.feasibility: motor use against the model and a pseudo-inverse, and advice that holds."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,7 +82,7 @@ WAYPOINTS = ((0.0, 0.0), (0.6, 0.3), (0.9, 1.0), (0.3, 1.4), (-0.5, 0.9), (-0.4,
 SPOTS = ((0, 0, 0), (1, 0, 0), (1, 0, 1.5), (1, 1, 1.5), (1, 1, 3.0), (0, 1, 3.0))
 LOG = [(0.05 * k, round(np.cos(0.045 * k), 3), round(np.sin(0.065 * k), 3), round(0.025 * k, 3)) for k in range(120)]
 STOPS = [(0, 0, 0, 0), (1.13, 0.5, 0.1, 0.3), (2.41, 1.2, 0.5, 0.8), (3.33, 1.2, 0.5, 0.8), (4.77, 0.3, 1.1, 0.2)]
-PATHS = {
+PATHS: dict[str, Any] = {
     "circle": "circle",
     "ellipse": "ellipse",
     "lemniscate": "lemniscate",
@@ -156,7 +157,7 @@ def test_advice_holds_at_other_time_steps_too(shape, time_step):
     tidybot = load_robot("tidybot2")
     with pytest.raises(ValueError, match="would do") as error:
         build_trajectories({"shape": shape, "duration": 4.0}, tidybot, 0.02)
-    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
     exact = time_step * np.ceil(duration / time_step)  # a coarse step may shorten it, by half of itself
     assert build_trajectories({"shape": shape, "duration": exact}, tidybot, time_step)
 
@@ -211,7 +212,7 @@ def test_a_geared_motor_of_the_same_power_has_the_same_use():
 def test_the_duration_that_an_error_offers_does_and_a_tenth_less_does_not(shape):
     with pytest.raises(ValueError, match="would do") as error:
         build_trajectories({"shape": shape, "duration": 2.0}, ROBOT, 0.02)
-    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
     assert build_trajectories({"shape": shape, "duration": duration}, ROBOT, 0.02)
     with pytest.raises(ValueError, match="would do"):
         build_trajectories({"shape": shape, "duration": 0.9 * duration}, ROBOT, 0.02)
@@ -260,7 +261,7 @@ def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they
     path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
     with pytest.raises(ValueError, match="would do") as error:
         build_trajectories(path, ROBOT, 0.1)
-    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
     assert build_trajectories({**path, "duration": duration}, ROBOT, 0.1)
     with pytest.raises(ValueError, match="takes more time steps than a path may have"):
         build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 6e4}, ROBOT, 0.1)
@@ -271,7 +272,7 @@ def test_viscous_friction_falls_with_speed_and_the_slow_path_that_is_offered_is_
     sticky = robot_with(roll={"max_torque": 0.2, "max_speed": 100.0, "viscous": 0.5})
     with pytest.raises(ValueError, match="would do") as error:
         build_trajectories(path, sticky, 0.02)
-    duration = float(re.search(r"a duration of at least ([\d.]+) s would do", str(error.value)).group(1))
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
     assert build_trajectories({**path, "duration": duration}, sticky, 0.02)
 
 
@@ -279,13 +280,13 @@ def test_a_path_that_would_take_too_many_time_steps_is_told_how_much_slower_it_m
     far = {"shape": "circle", "radius": 1e4, "duration": 1000.0}
     with pytest.raises(ValueError, match=r"must be driven \S+ times as slowly, .* more time steps than") as error:
         build_trajectories(far, ROBOT, 0.02)
-    slower = float(re.search(r"driven (\S+) times", str(error.value)).group(1))
+    slower = float(re.findall(r"driven (\S+) times", str(error.value))[0])
     assert build_trajectories({**far, "duration": 1000.0 * slower}, ROBOT, 0.05)
 
 
 def test_a_feasible_path_passes_in_silence():
     (circle,) = read_paths("circle")
-    assert check_feasible(circle, circle.trajectories(0.02), ROBOT) is None
+    check_feasible(circle, circle.trajectories(0.02), ROBOT)
 
 
 def test_a_robot_at_rest_uses_nothing():

@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import build_trajectories, read_paths
+from caster_gym.paths.splines import Spline
+from caster_gym.paths.timed import Timed
 from caster_gym.tables import TableNote
 
 ROBOT = load_robot("chung2008")
@@ -38,6 +40,7 @@ def test_race_lines_of_both_conventions_under_the_same_header_are_read_rightly(t
     text, expected = race_line(zero)
     with pytest.warns(TableNote) as notes:
         (path,) = read_paths({"shape": "spline", "file": str(written(tmp_path, text)), "closed": True})
+    assert isinstance(path, Spline)
     points = np.array(path.waypoints)
     assert_allclose(points[:, :2], expected[:, :2], atol=1e-7)  # seven digits are written
     assert_allclose(np.exp(1j * points[:, 2]), np.exp(1j * expected[:, 2]), atol=1e-6)
@@ -68,7 +71,8 @@ def test_psi_of_a_robot_that_does_not_face_its_way_needs_its_axis_said(tmp_path)
         read_paths(file)
     for axis, turn in (("x", 0.0), ("y", 0.5 * np.pi)):
         (path,) = read_paths({"shape": "spline", "file": str(file), "zero_axis": axis})
-        assert_allclose([point[2] for point in path.waypoints], np.array([1.0, 1.1, 1.2]) + turn)
+        assert isinstance(path, Spline)
+        assert_allclose([point[-1] for point in path.waypoints], np.array([1.0, 1.1, 1.2]) + turn)
 
 
 @pytest.mark.parametrize(
@@ -109,6 +113,7 @@ def test_a_tum_trajectory_is_read_with_the_heading_of_its_quaternions(tmp_path):
     rows = [f"{1305031098.66 + 0.5 * k} {0.3 * k} 0.1 1.6 0 0 {np.sin(0.2 * k)} {np.cos(0.2 * k)}" for k in range(4)]
     with pytest.warns(TableNote, match="the column tz is left out"):
         (path,) = read_paths(written(tmp_path, "\n".join(rows), "log.tum"))
+    assert isinstance(path, Timed)
     assert_allclose(path.poses, [[0.5 * k, 0.3 * k, 0.1, 0.4 * k] for k in range(4)], atol=1e-7)  # digits of the stamps
 
 
@@ -124,6 +129,7 @@ def test_a_spline_through_a_file_with_times_leaves_them_out_and_tells(tmp_path):
     file = written(tmp_path, "time,x,y\n0,0,0\n1,2,3\n")
     with pytest.warns(TableNote, match="the times are left out"):
         (path,) = read_paths({"shape": "spline", "file": str(file)})
+    assert isinstance(path, Spline)
     assert path.waypoints == ((0.0, 0.0), (2.0, 3.0))
 
 
@@ -131,6 +137,7 @@ def test_a_heading_beside_a_file_replaces_the_file_s_own(tmp_path):
     file = written(tmp_path, "x,y,heading\n0,0,0\n1,2,3\n")
     with pytest.warns(TableNote, match="the column heading is left out"):
         (path,) = read_paths({"shape": "spline", "file": str(file), "heading": "tangent"})
+    assert isinstance(path, Spline)
     assert path.waypoints == ((0.0, 0.0), (1.0, 2.0))
 
 
@@ -138,6 +145,7 @@ def test_a_heading_beside_a_file_replaces_the_file_s_own(tmp_path):
 @pytest.mark.parametrize("kind", [str, lambda file: file])
 def test_files_are_known_by_their_suffix_in_any_case_and_kind(tmp_path, name, kind):
     (path,) = read_paths(kind(written(tmp_path, "x,y\n0,0\n1,1\n", name)))
+    assert isinstance(path, Spline)
     assert path.waypoints == ((0.0, 0.0), (1.0, 1.0))
 
 
@@ -148,6 +156,7 @@ def test_a_file_named_in_a_yaml_file_starts_from_its_folder(tmp_path, monkeypatc
     file = written(tmp_path / "inner", "{shape: spline, file: points.csv, duration: 7.0}", name)
     monkeypatch.chdir(tmp_path)
     (path,) = read_paths(file)
+    assert isinstance(path, Spline)
     assert (path.waypoints, path.duration) == (((0.0, 0.0), (1.0, 1.0)), 7.0)
 
 
@@ -177,8 +186,9 @@ def test_a_file_that_is_refused_says_what_to_change(tmp_path, text, message):
 def test_the_unit_beside_a_file_is_that_of_its_headings(tmp_path, unit):
     file = written(tmp_path, "x,y,heading\n0,0,0\n1,0,90\n2,0,180\n")
     (path,) = read_paths({"shape": "spline", "file": str(file), "unit": unit})
+    assert isinstance(path, Spline)
     assert_allclose(
-        [point[2] for point in path.waypoints], np.array([0.0, 90.0, 180.0]) * (np.pi / 180 if unit == "deg" else 1)
+        [point[-1] for point in path.waypoints], np.array([0.0, 90.0, 180.0]) * (np.pi / 180 if unit == "deg" else 1)
     )
     clashing = written(tmp_path, "x,y,heading [rad]\n0,0,0\n1,0,1\n")
     with pytest.raises(ConfigurationError, match="says its unit in the header, and that is not deg; leave 'unit' out"):

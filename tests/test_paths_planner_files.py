@@ -8,6 +8,8 @@ from numpy.testing import assert_allclose
 
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import read_paths
+from caster_gym.paths.splines import Spline
+from caster_gym.paths.timed import Timed
 from caster_gym.tables import TableNote
 
 TIMES = np.linspace(0.0, 2.0, 21)
@@ -148,7 +150,8 @@ def test_a_file_without_what_is_needed_is_refused_by_name(tmp_path, content, mes
 def test_a_planner_s_file_can_be_named_in_a_mapping(tmp_path, shape):
     read(tmp_path, "a.traj", CHOREO)
     (path,) = read_paths({"shape": shape, "file": str(tmp_path / "a.traj")})
-    rows = path.waypoints if shape == "spline" else [pose[1:] for pose in path.poses]
+    assert isinstance(path, Spline | Timed) and path.shape == shape
+    rows = path.waypoints if isinstance(path, Spline) else [pose[1:] for pose in path.poses]
     assert_allclose(rows, np.column_stack([1.0 + TIMES, 2.0 * TIMES, 0.25 * TIMES]), atol=1e-15)
 
 

@@ -76,7 +76,7 @@ def lap_slope(shape):
 
 def test_circle_follows_the_time_law_of_the_paper_at_its_radius():
     """chung2008, Fig. 5: x = R cos β, y = R sin β, β(t) of (61)."""
-    table = samples(Circle(radius=5.0, duration=60.0, heading={"kind": "tangent", "offset": -np.pi / 2}))
+    table = samples(Circle(radius=5.0, duration=60.0, heading=Tangent(offset=-np.pi / 2)))
     t = DT * np.arange(len(table))
     beta = 20 * np.pi / 60**3 * t**3 - 30 * np.pi / 60**4 * t**4 + 12 * np.pi / 60**5 * t**5
     # Rounding of lengths of 5 m.

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths import COLUMNS, PathSpecification, build_trajectories, read_paths
+from caster_gym.paths.headings import Spinning
 from caster_gym.paths.random_paths import RandomPaths
 from caster_gym.paths.shapes import Circle, Ellipse
 from caster_gym.paths.splines import Spline
@@ -33,7 +34,7 @@ def test_sequences_keep_their_order_and_may_be_nested():
 def test_a_path_can_be_a_yaml_file(tmp_path):
     file = tmp_path / "path.yaml"
     file.write_text("{shape: circle, radius: 1.5e0, heading: {kind: spinning, turns: 2}}", encoding="utf-8")
-    assert read_paths(str(file)) == (Circle(radius=1.5, heading={"kind": "spinning", "turns": 2.0}),)
+    assert read_paths(str(file)) == (Circle(radius=1.5, heading=Spinning(turns=2.0)),)
 
 
 def test_a_path_can_be_a_csv_file_of_waypoints(tmp_path):

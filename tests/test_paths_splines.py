@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
+from caster_gym.paths.headings import Fixed, Profile, Spinning
 from caster_gym.paths.splines import Spline
 from tests.motion_laws import derivative_error
 
@@ -70,7 +71,7 @@ def test_a_path_that_turns_back_on_the_spot_has_no_tangent_to_follow():
     there_and_back = ((0.0, 0.0), (1.0, 0.0), (0.0, 0.0))
     with pytest.raises(ValueError, match=r"of path 'spline' (turns by|is (nan|inf))"):
         samples(Spline(waypoints=there_and_back))
-    assert samples(Spline(waypoints=there_and_back, heading="fixed"))[:, 0].max() == pytest.approx(1.0)
+    assert samples(Spline(waypoints=there_and_back, heading=Fixed()))[:, 0].max() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -99,14 +100,14 @@ def test_a_tolerance_beyond_a_tenth_of_the_extent_is_refused_and_the_offered_one
     waypoints = ((0.0, 0.0), (1.23, 0.0), (1.23, 0.7), (0.0, 0.7))
     with pytest.raises(ValidationError, match=r"tolerance of 2 m is more than a tenth of the 1\.23 m") as error:
         Spline(waypoints=waypoints, closed=True, tolerance=2.0)
-    offered = float(re.search(r"at most ([\d.]+) m would do", str(error.value)).group(1))
+    offered = float(re.findall(r"at most ([\d.]+) m would do", str(error.value))[0])
     assert len(samples(Spline(waypoints=waypoints, closed=True, tolerance=offered))) == 501
 
 
 def test_file_gives_the_same_path_as_its_numbers(tmp_path):
     file = tmp_path / "course.csv"
     file.write_text("\ufeffx, y, heading\n0,0,3.0\n1,0,-3.0\n\n1,1,-2\n0,1,1e0\n", encoding="utf-8")
-    spline = Spline(file=str(file), closed=True)
+    spline = Spline.model_validate({"file": str(file), "closed": True})
     assert spline.waypoints == ROUND
     assert_allclose(samples(spline), samples(Spline(waypoints=ROUND, closed=True)), atol=0.0)
 
@@ -114,7 +115,7 @@ def test_file_gives_the_same_path_as_its_numbers(tmp_path):
 def test_a_dumped_spline_keeps_its_waypoints_and_needs_its_file_no_more(tmp_path):
     file = tmp_path / "course.csv"
     file.write_text("x,y\n0,0\n1,0\n1,1\n", encoding="utf-8")
-    dumped = Spline(file=str(file)).model_dump()
+    dumped = Spline.model_validate({"file": str(file)}).model_dump()
     file.unlink()
     assert Spline(**dumped).waypoints == TRIANGLE
 
@@ -145,7 +146,7 @@ def test_one_place_is_kept_for_the_duration(waypoints, laps):
 
 
 def test_a_kept_place_may_be_turned_at_by_a_heading_of_its_own():
-    table = samples(Spline(waypoints=((1.0, 2.0),), heading={"kind": "spinning", "turns": 2}))
+    table = samples(Spline(waypoints=((1.0, 2.0),), heading=Spinning(turns=2)))
     assert turned(table)[-1] == pytest.approx(4.0 * np.pi)
 
 
@@ -222,20 +223,20 @@ def test_a_turn_on_the_spot_that_was_recorded_is_one():
     ],
 )
 def test_headings_turn_as_they_are_written_or_the_nearest_way(headings, turns, whole):
-    waypoints = [(float(i), 0.0, heading) for i, heading in enumerate(headings)]
+    waypoints = tuple((float(i), 0.0, heading) for i, heading in enumerate(headings))
     spline = Spline(waypoints=waypoints, turns=turns, duration=60.0)
     assert turned(samples(spline))[-1] == pytest.approx(whole, abs=1e-9)
 
 
 def test_a_profile_and_waypoints_of_the_same_headings_turn_alike():
     at, headings = (0.0, 1.0, 2.0, 3.0), (0.0, 4.0, 9.0, 2.0)
-    own = samples(Spline(waypoints=[(x, 0.0, h) for x, h in zip(at, headings, strict=True)], duration=40.0))
-    profile = {"kind": "profile", "angles": headings}
-    given = samples(Spline(waypoints=[(x, 0.0) for x in at], heading=profile, duration=40.0))
+    turning = tuple((x, 0.0, h) for x, h in zip(at, headings, strict=True))
+    own = samples(Spline(waypoints=turning, duration=40.0))
+    given = samples(Spline(waypoints=tuple((x, 0.0) for x in at), heading=Profile(angles=headings), duration=40.0))
     assert_allclose(own, given, atol=1e-9)
 
 
 def test_a_closed_path_turns_by_what_its_repeated_first_waypoint_says():
-    ring = [(np.cos(a), np.sin(a), -2.0 * a) for a in np.linspace(0.0, 2.0 * np.pi, 17)]
+    ring = tuple((np.cos(a), np.sin(a), -2.0 * a) for a in np.linspace(0.0, 2.0 * np.pi, 17))
     spline = Spline(waypoints=ring, closed=True, laps=3, duration=60.0)
     assert turned(samples(spline))[-1] == pytest.approx(-12.0 * np.pi, abs=1e-9)

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from caster_gym import Model, load_robot
+from caster_gym.arrays import Plane
 from caster_gym.paths import read_paths
 from caster_gym.paths.trailing import directions_at_rows, trailing_directions
 from caster_gym.paths.trajectory import COLUMNS
@@ -74,13 +75,14 @@ def test_pivots_that_never_move_keep_their_casters_ahead():
     assert_allclose(trailing_directions(still, 0.02, ROBOT), 1.0, atol=0.0)
 
 
-def turning_line(steps, intervals=20, length=2.0, turns=4.0):
+def turning_line(steps, intervals=20, length=2.0, turns=4.0) -> tuple[Plane, Plane]:
     """A straight line of C at `steps` points an interval, the heading turning: pivots move in loops and cusps."""
     s = np.linspace(0.0, length, steps * intervals + 1)
     point, heading = s.astype(np.complex128), np.exp(2j * np.pi * turns * s / length)
-    return [
+    points, headings = (
         np.stack([p[k : p.size - steps + k : steps] for k in range(steps + 1)])[..., None] for p in (point, heading)
-    ]
+    )
+    return points, headings
 
 
 def test_maps_of_whole_intervals_give_the_directions_that_the_model_integrates():

@@ -48,8 +48,8 @@ def test_samples_cannot_be_changed_and_do_not_follow_the_array_they_came_from():
 
 def test_columns_hold_what_their_names_say():
     names = ("x", "vx", "ax")
-    motion = tuple(np.full(4, 10 * i + 1 + 1j * (10 * i + 2)) for i in range(3))
-    table = tabulate(motion, (np.full(4, 0.6 + 0.8j), np.full(4, 7.0), np.full(4, 8.0)))
+    x, v, a = (np.full(4, 10 * i + 1 + 1j * (10 * i + 2)) for i in range(3))
+    table = tabulate((x, v, a), (np.full(4, 0.6 + 0.8j), np.full(4, 7.0), np.full(4, 8.0)))
     for i, name in enumerate(names):
         column = COLUMNS.index(name)
         assert_allclose(table[:, column : column + 2], [[10 * i + 1, 10 * i + 2]] * 4)

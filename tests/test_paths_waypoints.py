@@ -241,7 +241,7 @@ def test_significant_digits_are_a_rounding_too(digits):
     """Values near 0 have more decimals than others; the curvature was 2.4 instead of 1.39 1/m for 4 digits."""
     t = np.linspace(0.0, 2.0 * np.pi, 500)
     columns = 1.5 * np.sin(t), 0.8 * np.sin(2.0 * t)
-    points = [(float(f"{x:.{digits}g}"), float(f"{y:.{digits}g}")) for x, y in zip(*columns, strict=True)]
+    points = tuple((float(f"{x:.{digits}g}"), float(f"{y:.{digits}g}")) for x, y in zip(*columns, strict=True))
     (path,) = Spline(waypoints=points, duration=20.0).trajectories(0.01)
     v, a = path.samples[100:-100, 4:6] @ [1.0, 1.0j], path.samples[100:-100, 7:9] @ [1.0, 1.0j]
     assert np.abs((v.conj() * a).imag / np.abs(v) ** 3).max() < 1.03 * 3.3333  # of the curve itself

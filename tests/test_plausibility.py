@@ -3,6 +3,7 @@
 import copy
 import warnings
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 import yaml
@@ -12,7 +13,7 @@ from caster_gym.configuration import read_yaml
 from caster_gym.plausibility import RobotWarning
 from tests.random_robots import CASTER_COUNTS, random_robot
 
-FOLDER = files("caster_gym.configs") / "robots"
+FOLDER = Path(str(files("caster_gym.configs"))) / "robots"
 
 
 def content(name="tidybot2"):

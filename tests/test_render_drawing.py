@@ -107,10 +107,10 @@ def test_a_wheel_that_slips_has_an_arrow_along_its_slip():
 
 
 def test_a_patch_of_the_floor_is_where_it_is_and_tells_ice_from_rough_ground():
-    patches = [
+    patches = (
         Patch(x=0.3, y=0.2, radius=0.25, friction=0.1),
         Patch(x=-0.6, y=0.5, radius=0.1, friction=0.9),
-    ]
+    )
     frame, view = drawn(scene(5.0, 5.0, floor=Floor(friction=0.7, patches=patches)), follow=None)
     for patch, colour in zip(patches, (palette.ICE, palette.ROUGH), strict=True):
         rows, columns = np.nonzero((frame == colour).all(axis=2))
@@ -175,6 +175,7 @@ def test_the_trace_is_where_the_robot_was():
     viewer = Viewer("rgb_array", SQUARE)
     for time in np.linspace(0.0, 1.0, 30):
         frame = viewer.show([scene(-1.0 + 2.0 * time, 0.3, time=float(time))])
+    assert frame is not None
     for x in (-0.9, -0.3, 0.4):
         column, row = view_of = np.floor(viewer.view().pixels((x, 0.3))).astype(int)
         assert view_of.min() > 0

@@ -1,5 +1,7 @@
 """caster_gym.render.recording: films that can be read again, whole or not there."""
 
+import tempfile
+
 import imageio.v3 as iio
 import numpy as np
 import pytest
@@ -112,7 +114,7 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     def refuse(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(module.tempfile, "mkdtemp", refuse)  # not by its mode, since root may write anywhere
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)  # not by its mode, since root may write anywhere
     with pytest.raises(OSError, match=r"cannot write to folder .*: Permission denied"):
         check_target(tmp_path / "run.mp4")
 

@@ -3,6 +3,7 @@
 import errno
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -134,7 +135,7 @@ def out_of_reach(tmp_path, monkeypatch):
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
     closed = tmp_path / "closed"
     closed.mkdir()
-    mkdir = tempfile.TemporaryDirectory
+    mkdir: Any = tempfile.TemporaryDirectory
 
     def refused(*arguments, dir=None, **options):
         if Path(dir) == closed:

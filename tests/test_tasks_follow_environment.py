@@ -78,6 +78,7 @@ def test_the_docstring_tells_the_numbers_of_the_task():
         rf"each axis and {number} rad": task.start_turn,
         rf"the {number} nearest obstacles": task.nearest,
     }
+    assert text is not None
     for pattern, value in said.items():
         (found,) = re.findall(pattern, text)
         assert float(found) == pytest.approx(value, abs=1e-12), pattern
@@ -308,7 +309,7 @@ def _started():
 def test_the_window_that_a_message_names_is_wide_enough(fields):
     with pytest.raises(ValueError, match="must be at least") as error:
         FollowParameters(**fields)
-    least = float(re.search(r"at least ([\d.]+) m", str(error.value))[1])
+    least = float(re.findall(r"at least ([\d.]+) m", str(error.value))[0])
     assert FollowParameters(**{**fields, "window": least})
 
 

@@ -1,5 +1,7 @@
 """caster_gym.tasks.hold: a pose is reached and held; single, batch and tensors agree; what is measured of it."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -88,7 +90,7 @@ def test_a_pose_has_no_place_along_it():
 
 def test_a_batch_is_equal_to_single_environments_bit_for_bit():
     """Across the ends of episodes, which last for 0.2 s here."""
-    how = {"target": TARGET, "duration": 0.2}
+    how: dict[str, Any] = {"target": TARGET, "duration": 0.2}
     batch = CasterHoldVectorEnv(3, autoreset_mode=AutoresetMode.SAME_STEP, **how)
     singles = [CasterHoldEnv(**how) for _ in range(3)]
     seen, _ = batch.reset(seed=7)
@@ -226,4 +228,4 @@ def test_the_table_of_the_docstring_has_the_defaults():
         f"({task.duration:g} s)",
         f"{task.start_offset:g} m along each of its axes and\n    {task.start_turn:g} rad",
     ):
-        assert words in text
+        assert text is not None and words in text

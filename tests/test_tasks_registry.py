@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import pytest
@@ -116,7 +117,7 @@ def test_weights_are_the_parameters_of_their_names(name):
     """Each into the field that means it; a flag is 1 or 0."""
     task = find_task(name)
     fields = [field for field in task.weights._fields if field not in ("corridor", "touching_ends")]
-    values = {field: 1.25 + 0.111 * i for i, field in enumerate(fields)}
+    values: dict[str, Any] = {field: 1.25 + 0.111 * i for i, field in enumerate(fields)}
     parameters = task.parameters(**values, corridor=2.9, touching="ends")
     weights = task.weights(*task.weights_of(parameters).tolist())._asdict()
     assert weights == {**values, "corridor": 2.9, "touching_ends": 1.0}
@@ -155,7 +156,7 @@ def test_an_edit_of_what_a_task_imports_compiles_it_anew(own, tmp_path):
     task = find_task(f"{own}:TASK")
     kind = type("Kind", (), {"instance_class": task.source})()
     first = outside_digest((kind,))
-    assert own in first
+    assert first is not None and own in first
     (tmp_path / f"{own}_helper.py").write_text(HELPER.format(factor=2.0))
     assert outside_digest((kind,)) is None  # this process has read the old one: nothing is kept for others
     note_outside((task.source,), [own])

@@ -126,8 +126,9 @@ def test_resets_without_a_seed_continue_a_reproducible_sequence():
         starts = [env.reset(seed=9)[0]]
         starts += [env.reset()[0] for _ in range(5)]
         sequences.append(np.array(starts))
-    assert_array_equal(*sequences)
-    assert len(np.unique(sequences[0], axis=0)) == 6
+    first, second = sequences
+    assert_array_equal(first, second)
+    assert len(np.unique(first, axis=0)) == 6
 
 
 def test_environments_without_a_seed_start_differently():
@@ -137,7 +138,7 @@ def test_environments_without_a_seed_start_differently():
 def test_what_was_returned_belongs_to_the_caller():
     """Spoiling it changes nothing later, and later steps do not change it."""
     spoiled, clean = CasterTrackEnv(**WIDE), CasterTrackEnv(**WIDE)
-    results = [env.reset(seed=1) for env in (spoiled, clean)]
+    results: list[tuple[Any, ...]] = [env.reset(seed=1) for env in (spoiled, clean)]
     for _ in range(5):
         assert_array_equal(flat(results[0]), flat(results[1]))
         kept = flat(results[1]).copy()
@@ -348,7 +349,7 @@ def test_the_layout_in_the_docstring_is_the_layout_of_the_engine():
     expected += [f"{first} … {first - 1}+2N", f"{first}+2N … {first - 1}+4N"]
     widths = [parts[name].stop - parts[name].start for name in ("preview_0.1s", "obstacle_1")]
     expected += [f"then {widths[0]} for each K", f"then {widths[1]} for each of `nearest` (0)"]
-    table = CasterTrackEnv.__doc__.split("**Observation**")[1].split("**Reward**")[0]
+    table = (CasterTrackEnv.__doc__ or "").split("**Observation**")[1].split("**Reward**")[0]
     indices = re.findall(r"^ *\| ([^|]+?) \|.*±", table, re.M)
     assert indices == expected
 

@@ -34,7 +34,12 @@ def shown_twist(env, observations):
 def sent(env, action):
     """What the environment inside is told for an action."""
     told, step = [], env.env.step
-    env.env.step = lambda given: (told.append(given.copy()), step(given))[1]
+
+    def noted(given):
+        told.append(given.copy())
+        return step(given)
+
+    env.env.step = noted
     env.step(action)
     env.env.step = step
     return told[0]

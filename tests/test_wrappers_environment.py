@@ -199,6 +199,7 @@ def test_gymnasiums_checks_pass(features):
     """And the specification of a wrapped environment makes another one."""
     env = wrap(gym.make("caster_gym:CasterTrack-v0", **TASK, disable_env_checker=True).unwrapped, *features)
     check_env(env, skip_render_check=True)
+    assert env.spec is not None
     again = gym.make(env.spec)
     assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
 
@@ -269,7 +270,8 @@ def test_wrong_actions_are_refused_at_once(actions, message):
 
 
 def test_robots_must_be_reset_before_their_first_step():
-    for env in (batch(3, "NextStep", TORQUES), wrap(CasterTrackEnv(), *TORQUES)):
+    envs: list[Any] = [batch(3, "NextStep", TORQUES), wrap(CasterTrackEnv(), *TORQUES)]
+    for env in envs:
         with pytest.raises(RuntimeError, match="before its first step"):
             env.step(np.zeros(env.action_space.shape))
 
@@ -301,4 +303,5 @@ def test_a_copy_draws_what_the_original_draws(copied):
         seen.append(original.reset(seed=seed)[0])
         assert_array_equal(other.reset(seed=seed)[0], seen[-1])
         assert_array_equal(other.reset()[0], original.reset()[0])
-    assert not np.array_equal(*seen)
+    first, second = seen
+    assert not np.array_equal(first, second)

@@ -1,5 +1,7 @@
 """caster_gym.wrappers.plants: loads, friction and wheels that no agent is told of."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -75,7 +77,7 @@ def test_the_height_of_a_load_moves_the_mass_centre_up():
     standing = robot.model_copy(update={"platform": robot.platform.model_copy(update={"height": 0.1})})
     column = PlatformParameters._fields.index("height")
     for height, expected in ((0.5, (5.0 * 0.1 + 3.0 * 0.5) / 8.0), (None, 0.1)):
-        env = wrap(gym.make("caster_gym:CasterTrack-v0", robot=standing), Payload(mass=3.0, height=height))
+        env: Any = wrap(gym.make("caster_gym:CasterTrack-v0", robot=standing), Payload(mass=3.0, height=height))
         env.reset(seed=0)
         assert_allclose(env.unwrapped.engine.parameters[0, column], expected, rtol=1e-14)
     env = wrap(gym.make("caster_gym:CasterTrack-v0", robot=standing), Payload(mass=3.0, height=(0.2, 0.6)))
@@ -155,7 +157,7 @@ FEATURES = (
 def test_every_episode_starts_from_the_nominal_robot():
     """Draws do not add up, and two features change one robot together."""
     env = batch(*FEATURES, count=20)
-    rows = []
+    rows: list[Any] = []
     for _ in range(30):
         env.reset(seed=None if rows else 0)
         rows.append(env.unwrapped.engine.parameters)

@@ -21,7 +21,7 @@ from caster_gym.wrappers import (
     read_features,
     wrap,
 )
-from caster_gym.wrappers.rewards import falloff, shaping
+from caster_gym.wrappers.rewards import Shape, falloff, shaping
 
 PATH = {"shape": "circle", "radius": 0.5}
 ROBOT = load_robot("chung2008")
@@ -191,7 +191,7 @@ def test_worth_is_one_within_bounds_and_falls_to_its_value_at_the_margin(shape):
 def test_halfway_to_the_margin():
     """By hand: 0.2^(1/4), 1 / (1 + 4/4), 1 − 0.8/2, 1 − 0.8/4."""
     half = np.array([0.5])
-    expected = {"gaussian": 0.2**0.25, "long_tail": 0.5, "linear": 0.6, "quadratic": 0.8}
+    expected: dict[Shape, float] = {"gaussian": 0.2**0.25, "long_tail": 0.5, "linear": 0.6, "quadratic": 0.8}
     for shape, value in expected.items():
         assert_allclose(falloff(half, 0.2, shape), value, rtol=1e-12)
 

@@ -59,14 +59,14 @@ def difference(feature, name, part):
     ],
 )
 def test_noise_has_its_mean_and_standard_deviation(field, name, part):
-    errors = difference(SensorNoise(**{field: 0.03}), name, part)
+    errors = difference(SensorNoise.model_validate({field: 0.03}), name, part)
     assert abs(errors.mean()) < 0.03 * FAR
     assert abs(errors.std() / 0.03 - 1.0) < SPREAD
 
 
 @pytest.mark.parametrize(("field", "name"), [("heading", "heading_error"), ("heading_bias", "heading_error")])
 def test_heading_noise_turns_the_heading_error(field, name):
-    noisy, clean = batch(SensorNoise(**{field: 0.05})), batch()
+    noisy, clean = batch(SensorNoise.model_validate({field: 0.05})), batch()
     shown, true = (clean.unwrapped.engine.layout.physical(moving(env), name) for env in (noisy, clean))
     turned = np.arctan2(
         true[:, 0] * shown[:, 1] - true[:, 1] * shown[:, 0], true[:, 0] * shown[:, 0] + true[:, 1] * shown[:, 1]
@@ -170,8 +170,9 @@ def test_obstacles_are_seen_from_where_the_robot_is():
         "arena": {"pillars": [{"centre": [1.0, 0.0]}]},
         "nearest": 3,
     }
-    noisy, clean = (wrap(CasterTrackVectorEnv(5, **task), *f) for f in ([SensorNoise(position=0.1, heading=0.3)], []))
-    layout = clean.unwrapped.engine.layout
+    made = CasterTrackVectorEnv(5, **task)
+    noisy, clean = wrap(CasterTrackVectorEnv(5, **task), SensorNoise(position=0.1, heading=0.3)), wrap(made)
+    layout = made.engine.layout
     shown, true = moving(noisy), moving(clean)
     assert (layout.physical(true, "obstacle_1")[:, 0] < 1.0).any()  # at 1 m it is the end of what is seen
     for name in ("obstacle_1", "directions", "joint_rates", "twist"):

@@ -4,6 +4,7 @@ import inspect
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import TypeAdapter
@@ -16,7 +17,7 @@ KINDS = [
     one for one in vars(wrappers).values() if inspect.isclass(one) and issubclass(one, Feature) and one is not Feature
 ]
 PAGE = (Path(__file__).parent.parent / "docs" / "wrappers.md").read_text(encoding="utf-8")
-NEEDED = {
+NEEDED: dict[str, dict[str, Any]] = {
     "potential": {"quantity": "position_error", "margin": 0.5, "discount": 0.97},
     "tolerance": {"quantity": "power"},
     "residual_torque": {"agent": type("Idle", (), {"act": lambda self, observations: observations})()},

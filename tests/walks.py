@@ -71,10 +71,11 @@ def state_of(x, y, beta, velocity, omega, steering):
 
 def floats(state):
     """The same state in Python's numbers, which are the fastest for one robot."""
+    (x, y), (c, s), (vx, vy, omega) = (map(float, part) for part in state[:3])
     return State(
-        tuple(map(float, state.position)),
-        tuple(map(float, state.heading)),
-        tuple(map(float, state.twist)),
+        (x, y),
+        (c, s),
+        (vx, vy, omega),
         tuple((float(c), float(s)) for c, s in state.directions),
     )
 

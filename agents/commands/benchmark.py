@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator
 
-from caster_gym.agents.comparison.evaluation import bare, test_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch
 from caster_gym.agents.comparison.results import Contender, compare, write_results
 from caster_gym.agents.comparison.task_settings import Seed, TaskSettings
 from caster_gym.agents.comparison.validation import read_history, tune
@@ -87,8 +87,8 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
         if isinstance(agent, LearnerSettings)
         for seed in settings.seeds
     ]
-    test = test_batch(task, task.test, settings.starts)
-    validation = test_batch(task, task.validation, starts=1)
+    test = evaluation_batch(task, task.test, settings.starts)
+    validation = evaluation_batch(task, task.validation, starts=1)
     test.reset(seed=settings.start_seed)
     test.step(test.action_space.sample())  # compiles here once, if at all, so that the training processes need not
 

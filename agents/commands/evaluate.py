@@ -5,7 +5,7 @@ from pathlib import Path
 from caster_gym.agents.commands.benchmark import BenchmarkSettings
 from caster_gym.agents.commands.command_line import files_among
 from caster_gym.agents.commands.selection import choose_agent, choose_task
-from caster_gym.agents.comparison.evaluation import test_batch
+from caster_gym.agents.comparison.evaluation import evaluation_batch
 from caster_gym.agents.comparison.results import Contender, compare, write_results
 from caster_gym.engines.tensor.threads import limit_threads
 from caster_gym.report.provenance import write_provenance
@@ -19,7 +19,7 @@ def evaluate(policy: str, task: str | None, starts: int, out: Path, overwrite: b
     for read in files_among(task, settings.robot):
         check_free(out, overwrite, kept=read)
     with limit_threads(threads), staged(out, overwrite, kept=Path(policy)) as folder:
-        test = test_batch(settings, settings.test, starts)
+        test = evaluation_batch(settings, settings.test, starts)
         agent, tuned = choose_agent(policy, settings, test)
         compared = compare([Contender(agent.name, agent, None)], test, how.start_seed)
         text = write_results(folder, compared, test, how.confidence, {}, words)

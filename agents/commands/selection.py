@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from caster_gym.agents.comparison.evaluation import Batch, bare, test_batch
+from caster_gym.agents.comparison.evaluation import Batch, bare, evaluation_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
@@ -40,7 +40,7 @@ def choose_agent(name: str, settings: TaskSettings, batch: Batch) -> ChosenAgent
     named = name in names_of("agents") or (is_yaml(name) and folder.name not in RESULTS)
     known = read_agent(name) if named else None
     if isinstance(known, ControllerSettings) and not (folder / DESCRIPTION).is_file():
-        return ChosenAgent(*tune(known, test_batch(settings, settings.validation, starts=1)))
+        return ChosenAgent(*tune(known, evaluation_batch(settings, settings.validation, starts=1)))
     if known is None and not folder.exists() and len(folder.parts) == 1:
         model_based = [one for one in names_of("agents") if isinstance(read_agent(one), ControllerSettings)]
         raise ValueError(

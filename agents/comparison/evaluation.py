@@ -49,7 +49,7 @@ def make_batch(
     return wrap(batch, *features) if features else batch
 
 
-def test_batch(settings: TaskSettings, paths: Paths, starts: int) -> Batch:
+def evaluation_batch(settings: TaskSettings, paths: Paths, starts: int) -> Batch:
     """A batch with one robot for every start on every path; robots 0, 1, … follow path 0, 1, …, then again."""
     single = make_batch(settings, paths, 1, AutoresetMode.NEXT_STEP)
     count = len(bare(single).engine.plan.names) * starts

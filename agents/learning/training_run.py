@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from stable_baselines3.common.logger import KVWriter, configure
 
-from caster_gym.agents.comparison.evaluation import bare, test_batch
+from caster_gym.agents.comparison.evaluation import bare, evaluation_batch
 from caster_gym.agents.comparison.metrics import in_words
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation, verdict_on, write_history
@@ -32,7 +32,7 @@ class Run:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder, self.task, self.settings, self.seed, self.report = folder, task, settings, seed, report
         self.logger = configure(str(folder), ["csv", "tensorboard"])
-        self.validation = test_batch(task, task.validation, starts=1)
+        self.validation = evaluation_batch(task, task.validation, starts=1)
         self.history: list[Validation] = []
         self.best: Validation | None = None
         self.steps = 0

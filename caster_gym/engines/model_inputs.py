@@ -1,16 +1,18 @@
 """What users give to a model, checked, as the scalars of the mechanics; and scalars as what users get."""
 
 import reprlib
-from typing import Any
+from abc import ABC, abstractmethod
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from caster_gym.arrays import Array
 from caster_gym.mechanics.scalars import Direction, Vector, pairs
 from caster_gym.robot import Robot
 
+Numbers = TypeVar("Numbers")  # arrays of the engine
 
-class ModelInputs:
+
+class ModelInputs(ABC, Generic[Numbers]):
     """Arrays (..., last) taken apart along their last axis; engines on other kinds of arrays override parts of it."""
 
     robot: Robot
@@ -68,8 +70,10 @@ class ModelInputs:
         c, s = self._unit(angle)
         return angle + self._arrays.atan2(f[1] * c - f[0] * s, f[0] * c + f[1] * s)
 
-    def _scalar(self, value: Any) -> Array:
-        return np.asarray(value)
+    @abstractmethod
+    def _scalar(self, value: Any) -> Numbers:
+        """One number for each robot of the batch, as an array."""
 
-    def _stack(self, parts: Any, axis: int = -1) -> Array:
-        return np.stack(np.broadcast_arrays(*parts), axis)
+    @abstractmethod
+    def _stack(self, parts: Any, axis: int = -1) -> Numbers:
+        """Parts, made of one shape, along a new axis."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
-from caster_gym.engines.model_inputs import ModelInputs
+from caster_gym.engines.model_inputs import ModelInputs, Numbers
 from caster_gym.engines.time_step import check_rows, check_time_step
 from caster_gym.floor import Floor, FloorLike, load_floor
 from caster_gym.mechanics import actuation, caster, dynamics, ground, impulse
@@ -26,26 +26,8 @@ from caster_gym.robot import Robot, check_joints
 ROUGHEST = 1e6  # [-] between hull and obstacles: a contact sticks long before
 
 
-class Model(ModelInputs):
-    """Kinematics, dynamics, ground forces and impacts of a robot, on arrays whose leading axes are a batch.
-
-    steering (..., N): angles δ from the body x-axis to each rolling direction [rad]
-    twist (..., 3): vx, vy, ω at C in the body frame [m/s, m/s, rad/s]
-    torque (..., 2 N): at the joints roll_1, steer_1, roll_2, steer_2, … [N m]; given to every joint, driven or not
-    state (..., 6 + N): x, y [m], β [rad] in the world, twist, steering
-
-    dynamics="chung2008" leaves the term (D1) out of the bias, as that paper prints the model. parameters replaces the
-    robot's own numbers, for instance by arrays with one value per robot of the batch.
-    Source: docs/equations.md. Raises ValueError for arrays of the wrong last axis and for values that are not finite.
-
-    >>> import caster_gym, numpy as np
-    >>> model = caster_gym.Model(caster_gym.load_robot("chung2008"))
-    >>> model.inertia([0.0, 0.0, 0.0]).diagonal().round(3)  # all wheels ahead [kg, kg, kg m²]
-    array([7.55 , 5.421, 0.04 ])
-    >>> states = model.simulate(np.zeros(9), [0.1, 0, 0.1, 0, 0.1, 0], dt=0.005, steps=200)
-    >>> states.shape, states[-1, :3].round(3)  # 1 s later: x, y [m], β [rad]
-    ((201, 9), array([0.795, 0.   , 0.   ]))
-    """
+class RobotModel(ModelInputs[Numbers]):
+    """The mechanics of a robot on any kind of arrays, as `Model` describes them."""
 
     def __init__(self, robot: Robot, dynamics: Dynamics = "exact", parameters: RobotParameters | None = None) -> None:
         if not isinstance(robot, Robot):
@@ -55,13 +37,13 @@ class Model(ModelInputs):
         self._parameters = robot_parameters(robot, dynamics) if parameters is None else parameters
         self._rows = None if parameters is None else self._replaced(parameters)  # (robots, fields)
 
-    def rates(self, steering: ArrayLike, twist: ArrayLike) -> tuple[Array, Array, Array]:
+    def rates(self, steering: ArrayLike, twist: ArrayLike) -> tuple[Numbers, Numbers, Numbers]:
         """Yaw rates over ground η̇, rolling rates θ̇, steering rates δ̇, each (..., N). [rad/s]"""
         directions, v = self._directions(steering), self._vector("twist", twist)
         eta, theta, delta = zip(*each(caster.rates, (v,), directions, self._parameters.casters), strict=True)
         return self._stack(eta), self._stack(theta), self._stack(delta)
 
-    def jacobian(self, steering: ArrayLike, joints: str | Sequence[str] = "all") -> Array:
+    def jacobian(self, steering: ArrayLike, joints: str | Sequence[str] = "all") -> Numbers:
         """Rows (..., J, 3) that give the rates of the named joints from the twist; joints in the order given."""
         directions = self._directions(steering)
         names = self.robot.joints if joints == "all" else check_joints(_listed(joints), self.robot.caster_count)
@@ -69,17 +51,17 @@ class Model(ModelInputs):
         chosen = [rows[j // 2][1 + j % 2] for j in map(self.robot.joints.index, names)]
         return self._stack([self._stack(row) for row in chosen], -2)
 
-    def inertia(self, steering: ArrayLike) -> Array:
+    def inertia(self, steering: ArrayLike) -> Numbers:
         """Inertia matrix M (..., 3, 3) of the whole robot at C, in B."""
         xx, xy, xz, yy, yz, zz = dynamics.inertia(self._directions(steering), self._parameters)
         rows = [self._stack(row) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
         return self._stack(rows, -2)
 
-    def bias(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+    def bias(self, steering: ArrayLike, twist: ArrayLike) -> Numbers:
         """Coriolis and centrifugal force h (..., 3) at C, in B."""
         return self._stack(dynamics.bias(self._vector("twist", twist), self._directions(steering), self._parameters))
 
-    def friction(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+    def friction(self, steering: ArrayLike, twist: ArrayLike) -> Numbers:
         """Friction of joints and contact patches (..., 3) at C, in B, as the force that overcomes it."""
         return self._stack(
             dynamics.resistance(self._vector("twist", twist), self._directions(steering), self._parameters)
@@ -87,27 +69,27 @@ class Model(ModelInputs):
 
     def forward_dynamics(
         self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike, wrench: ArrayLike | None = None
-    ) -> Array:
+    ) -> Numbers:
         """Twist rate (..., 3): derivative of the components of the twist in B. wrench (..., 3) acts at C, in B."""
         directions, v = self._directions(steering), self._vector("twist", twist)
         force, torques = self._wrench(wrench), self._torques(torque)
         return self._stack(dynamics.forward_dynamics(v, directions, torques, force, self._parameters))
 
-    def inverse_dynamics(self, steering: ArrayLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
+    def inverse_dynamics(self, steering: ArrayLike, twist: ArrayLike, twist_rate: ArrayLike) -> Numbers:
         """Generalised force (..., 3) at C, in B, that drives and wrench must supply together, friction included."""
         directions, v = self._directions(steering), self._vector("twist", twist)
         return self._stack(
             dynamics.inverse_dynamics(v, directions, self._vector("twist_rate", twist_rate), self._parameters)
         )
 
-    def kinetic_energy(self, steering: ArrayLike, twist: ArrayLike) -> Array:
+    def kinetic_energy(self, steering: ArrayLike, twist: ArrayLike) -> Numbers:
         """Kinetic energy (...) of all bodies. [J]"""
         directions, v = self._directions(steering), self._vector("twist", twist)
         return self._scalar(dynamics.kinetic_energy(v, directions, self._parameters))
 
     def ground_forces(
         self, steering: ArrayLike, twist: ArrayLike, torque: ArrayLike, wrench: ArrayLike | None = None
-    ) -> Array:
+    ) -> Numbers:
         """Forces (..., N, 2) of the floor on each wheel along f and f⊥. [N]
 
         Under joint torques and all else that pushes the robot: wrench (..., 3) at C, in B.
@@ -124,7 +106,7 @@ class Model(ModelInputs):
         twist: ArrayLike | None = None,
         torque: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
-    ) -> Array:
+    ) -> Numbers:
         """Normal forces (..., N) under the wheels: at rest, or of a robot that moves under torques and a wrench. [N]
 
         The wrench (..., 3) at C, in B, acts at the height of the platform's mass centre. A wheel that lifts has no
@@ -145,13 +127,13 @@ class Model(ModelInputs):
         """Length that makes moments comparable with forces: root mean square distance of the pivots from C. [m]"""
         return float(actuation.characteristic_length(self._parameters))
 
-    def motor_wrenches(self, steering: ArrayLike) -> Array:
+    def motor_wrenches(self, steering: ArrayLike) -> Numbers:
         """Wrenches (..., 3, driven) at C, in B, of the driven motors, each at its greatest torque. [N, N, N m]"""
         pairs_of = each(actuation.motor_wrenches, (), self._directions(steering), self._parameters.casters)
         wrenches = flatten(pairs_of)
         return self._stack([self._stack(wrenches[j]) for j in self.robot.driven_indices])
 
-    def conditioning(self, steering: ArrayLike) -> Array:
+    def conditioning(self, steering: ArrayLike) -> Numbers:
         """σ_min / σ_max (...) of the wrenches of the driven motors; 0 where they cannot push the robot somewhere."""
         return self._scalar(actuation.conditioning(self._directions(steering), self._parameters))
 
@@ -164,7 +146,7 @@ class Model(ModelInputs):
         restitution: ArrayLike,
         friction: ArrayLike = 0.0,
         law: ImpactLaw = "stronge",
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Numbers, Numbers]:
         """Impulse (..., 2), normal and tangential [N s], and the twist (..., 3) after an impact.
 
         point (..., 2) [m] and normal (..., 2), a unit vector from the obstacle into the robot, in B. The tangent is
@@ -196,7 +178,7 @@ class Model(ModelInputs):
         *,
         floor: FloorLike = None,
         checked: bool = False,
-    ) -> Array:
+    ) -> Numbers:
         """States (steps + 1, ..., 6 + N) from the given one on, by RK4 under joint torques.
 
         torque (..., 2 N) is constant, or (steps, ..., 2 N), one axis more than state, changes from step to step.
@@ -282,6 +264,34 @@ class Model(ModelInputs):
     def _replaced(self, parameters: RobotParameters) -> Array | None:
         columns = np.broadcast_arrays(*pack_parameters(parameters))
         return np.stack([np.ravel(column) for column in columns], axis=1)
+
+
+class Model(RobotModel[Array]):
+    """Kinematics, dynamics, ground forces and impacts of a robot, on arrays whose leading axes are a batch.
+
+    steering (..., N): angles δ from the body x-axis to each rolling direction [rad]
+    twist (..., 3): vx, vy, ω at C in the body frame [m/s, m/s, rad/s]
+    torque (..., 2 N): at the joints roll_1, steer_1, roll_2, steer_2, … [N m]; given to every joint, driven or not
+    state (..., 6 + N): x, y [m], β [rad] in the world, twist, steering
+
+    dynamics="chung2008" leaves the term (D1) out of the bias, as that paper prints the model. parameters replaces the
+    robot's own numbers, for instance by arrays with one value per robot of the batch.
+    Source: docs/equations.md. Raises ValueError for arrays of the wrong last axis and for values that are not finite.
+
+    >>> import caster_gym, numpy as np
+    >>> model = caster_gym.Model(caster_gym.load_robot("chung2008"))
+    >>> model.inertia([0.0, 0.0, 0.0]).diagonal().round(3)  # all wheels ahead [kg, kg, kg m²]
+    array([7.55 , 5.421, 0.04 ])
+    >>> states = model.simulate(np.zeros(9), [0.1, 0, 0.1, 0, 0.1, 0], dt=0.005, steps=200)
+    >>> states.shape, states[-1, :3].round(3)  # 1 s later: x, y [m], β [rad]
+    ((201, 9), array([0.795, 0.   , 0.   ]))
+    """
+
+    def _scalar(self, value: Any) -> Array:
+        return np.asarray(value)
+
+    def _stack(self, parts: Any, axis: int = -1) -> Array:
+        return np.stack(np.broadcast_arrays(*parts), axis)
 
 
 def _listed(joints: str | Sequence[str]) -> tuple[str, ...]:

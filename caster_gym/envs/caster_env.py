@@ -6,6 +6,7 @@ from typing import Any, Self
 import gymnasium as gym
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from caster_gym.configuration import Frozen
@@ -31,6 +32,8 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     task: Frozen  # parameters
+    observation_space: "Box[np.float32]"
+    action_space: "Box[np.float32]"
 
     def __init__(self, engine: TaskEngine, task: Frozen, render_mode: str | None) -> None:
         self.engine, self.task, self.robot = engine, task, engine.robot
@@ -61,7 +64,7 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
             self.render()
         return outcome.observations[0], self.engine.info(outcome.reports[:, 0])
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.floating[Any]]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
         if not (type(action) is np.ndarray and action.dtype is FLOAT32 and action.flags.carray):
             action = read_actions(action, self._action_shape, "action")

@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -44,6 +45,8 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     }
 
     task: Frozen  # parameters
+    single_observation_space: "Box[np.float32]"
+    single_action_space: "Box[np.float32]"
 
     def __init__(
         self, engine: TaskEngine, task: Frozen, autoreset_mode: AutoresetMode | str, render_mode: str | None
@@ -98,7 +101,7 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         return outcome.observations, self._masked(self.engine.info(outcome.reports), mask)
 
     def step(
-        self, actions: NDArray[np.float32]
+        self, actions: NDArray[np.floating[Any]]
     ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
         """Hold actions (num_envs, driven joints) for a control period.
 

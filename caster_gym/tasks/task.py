@@ -59,14 +59,14 @@ class Task:
     short_path: Mapping[str, Any]  # one that is quickly made and that no robot fails on, to compile with
     preview_unit: Literal["s", "m"]  # of the horizons at which observations show the coming reference
 
-    source: Callable[..., Any]  # type of the reference source, a named tuple; see `ReferenceSource`
+    source: type[Any]  # type of the reference source, a named tuple; see `ReferenceSource`
     lay_out: Callable[
         [Robot, tuple[AnyPath, ...], Any], "tuple[ReferenceSource, list[Way]]"
     ]  # from parameters; its weights are still to be filled in
     fetch: Callable[..., Any]  # writes what a robot is to do next; see `caster_gym.envs.native.reference.guide_robot`
 
-    weights: Callable[..., Any]  # type of the reward's numbers: a named tuple whose fields are those of the parameters
-    terms: Callable[..., Any]  # type of the reward's terms: a named tuple
+    weights: type[Any]  # type of the reward's numbers: a named tuple whose fields are those of the parameters
+    terms: type[Any]  # type of the reward's terms: a named tuple
     reward: Callable[[Any, Any], Any]  # terms from a `caster_gym.envs.tracking.Moment` and weights
 
     metrics: Metrics
@@ -100,5 +100,4 @@ class Task:
 
     def weights_of(self, parameters: TaskParameters) -> NDArray[np.float64]:
         """The reward's numbers (weights,)."""
-        fields: Any = self.weights
-        return np.array([float(getattr(parameters, name)) for name in fields._fields])
+        return np.array([float(getattr(parameters, name)) for name in self.weights._fields])

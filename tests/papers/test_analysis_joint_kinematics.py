@@ -50,7 +50,7 @@ def joint_motion(robot, seed, count=40):
         lambda delta, v: torch.stack(model.rates(delta, v), -1),
         tuple(map(torch.as_tensor, point)),
         tuple(map(torch.as_tensor, change)),
-    )
+    )[:2]
     return steering, twist, twist_rate, rates.numpy(), accelerations.numpy()
 
 

@@ -68,7 +68,7 @@ def test_all_six_joints_have_a_bound_of_their_own():
     assert bracket.lower > 1.27
 
 
-def least_by_scipy(robot, joints) -> float:
+def least_by_scipy(robot, joints):
     """The least smallest singular value from local searches by another method, from many places."""
     starts = np.random.default_rng(3).uniform(-np.pi, np.pi, (30, robot.caster_count))
     return min(

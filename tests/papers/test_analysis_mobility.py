@@ -106,11 +106,11 @@ def test_what_is_wrong_with_a_count_is_said():
     with pytest.raises(ValueError, match="a joint must have 1 to 2 freedoms, got 3"):
         grubler_mobility(3, 4, [1, 3])
     with pytest.raises(ValueError, match=r"links must be a whole number, got 2\.5"):
-        grubler_mobility(3, 2.5, [1])
+        grubler_mobility(3, 2.5, [1])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"the freedom of a joint must be a whole number, got 1\.5"):
-        grubler_mobility(3, 2, [1.5])
+        grubler_mobility(3, 2, [1.5])  # type: ignore[list-item]
     with pytest.raises(ValueError, match=r"the number of casters must be a whole number, got 3\.5"):
-        counted_mobility(3.5)
+        counted_mobility(3.5)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="number of casters must be 1 or more, got 0"):
         counted_mobility(0)
 

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from papers.analysis.orthogonal_complement import OrthogonalComplement
-from papers.chung2008.complement import LIMIT, PAPER_SET, section
-from papers.chung2008.complement_checks import printed_loops
+from papers.chung2008.complement import section
+from papers.chung2008.complement_checks import LIMIT, PAPER_SET, printed_loops
 from papers.chung2008.complement_runs import DECADES, DISTANCES, STEP, drive, power
 from papers.notation import CHUNG2008, lengths_of
 from papers.page import unexplained

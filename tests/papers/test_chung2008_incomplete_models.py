@@ -24,7 +24,12 @@ def page():
         patch.setattr(model_trials, "STARTS", 1)
         for module in (model_trials, incomplete_models):
             patch.setattr(module, "RUNGS", 2)
-        patch.setattr(incomplete_models, "study", lambda name: kept.append(build(name)) or kept[-1])
+
+        def kept_study(name):
+            kept.append(build(name))
+            return kept[-1]
+
+        patch.setattr(incomplete_models, "study", kept_study)
         return incomplete_models.section(), kept
 
 

@@ -92,7 +92,7 @@ def test_only_motions_that_own_their_time_can_be_driven_in_another():
         shape = "tape"
 
     with pytest.raises(ValueError, match="shape or random paths, got 'tape'"):
-        timed(Tape(), 8.0)
+        timed(Tape(), 8.0)  # type: ignore[arg-type]
 
 
 def test_the_shortest_time_leaves_the_motors_their_reserve_and_no_more():

@@ -1,5 +1,6 @@
 """A drawn robot has its parts where the conventions of docs/equations.md put them."""
 
+import numpy as np
 import pytest
 
 from caster_gym.report.figures import new_figure
@@ -13,7 +14,8 @@ def test_a_drawn_wheel_stands_behind_its_pivot(name):
     robot = load_robot(name)
     axis = new_figure().axes[0]
     draw_robot(axis, robot, [0.0] * robot.caster_count)
-    links = [line.get_xydata() for line in axis.lines if len(line.get_xydata()) == 2]
+    lines = [np.asarray(line.get_xydata()) for line in axis.lines]
+    links = [line for line in lines if len(line) == 2]
     for caster, ((x, y), (wheel_x, wheel_y)) in zip(robot.casters, links, strict=True):
         assert (x, y) == (caster.x, caster.y)
         assert (wheel_x, wheel_y) == pytest.approx((caster.x - caster.trail, caster.y + caster.offset), abs=1e-15)

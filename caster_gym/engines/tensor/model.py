@@ -4,14 +4,15 @@ import reprlib
 from typing import Any
 
 import torch
+from torch import Tensor
 
-from caster_gym.engines.numpy_model import Model
+from caster_gym.engines.numpy_model import RobotModel
 from caster_gym.engines.tensor.scalars import checked_device, checked_dtype
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters
 from caster_gym.robot import Robot
 
 
-class TorchModel(Model):
+class TorchModel(RobotModel[Tensor]):
     """`caster_gym.Model` for tensors of one floating-point type on one device; gradients pass through every method.
 
     parameters may hold tensors, so that gradients with respect to the robot's own numbers exist too. Values are not
@@ -53,10 +54,11 @@ class TorchModel(Model):
         except (ValueError, TypeError, RuntimeError) as error:  # the last of None, whose type it cannot infer
             raise ValueError(f"{name} must hold real numbers, got {reprlib.repr(value)}") from error
 
-    def _scalar(self, value: Any) -> Any:
-        return value
+    def _scalar(self, value: Any) -> Tensor:
+        number: Tensor = value
+        return number
 
-    def _stack(self, parts: Any, axis: int = -1) -> Any:
+    def _stack(self, parts: Any, axis: int = -1) -> Tensor:
         tensors = [torch.as_tensor(part, dtype=self.dtype, device=self.device) for part in parts]
         # Torch ships this one function without types
         return torch.stack(torch.broadcast_tensors(*tensors), axis)  # type: ignore[no-untyped-call]
