@@ -1,7 +1,10 @@
-"""How tests are spread over the cores, and which come first."""
+"""How tests are spread over the cores, and which come first; and how they call a command."""
 
 import os
 from collections import Counter
+
+import pytest
+import yaml
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # there is one worker for each core
     os.environ["OMP_NUM_THREADS"] = "1"
@@ -12,3 +15,17 @@ def pytest_collection_modifyitems(items):
     """Files with slow tests first, so that no core is left alone with one of them at the end."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
     items.sort(key=lambda item: -slow[item.path])
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch):
+    """Runs a command in a folder that holds only task.yaml; returns its result."""
+    from typer.testing import CliRunner  # most tests need neither
+
+    from caster_gym.agents.commands.cli import app
+    from tests.command_calls import TASK
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "task.yaml").write_text(yaml.safe_dump(TASK), encoding="utf-8")
+    runner = CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1", "TERM": "dumb"})
+    return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
