@@ -90,7 +90,7 @@ def test_an_environment_has_tasks_of_its_own():
     [
         (
             {"environment": "flow"},
-            "task: 'environment' should be 'track', 'follow' or 'module:Name' of your own, got 'flow'$",
+            "task: 'environment' should be 'track', 'follow', 'hold' or 'module:Name' of your own, got 'flow'$",
         ),
         ({"task": {"speed_limit": 1.0}}, "'speed_limit' is for environment 'follow', got it with environment 'track'"),
         (

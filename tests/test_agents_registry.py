@@ -11,8 +11,9 @@ import caster_gym
 from caster_gym.agents.control.computed_torque import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import PPOSettings, SACSettings
-from caster_gym.agents.registry import RESULTS, read_agent
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError
+from caster_gym.own_code import RESULTS
 from caster_gym.shipped_files import find, names_of
 
 
@@ -168,6 +169,6 @@ def test_settings_of_ones_own_are_checked_like_all_others(own):
 @pytest.mark.parametrize("result", RESULTS)
 def test_no_code_is_run_for_a_file_among_results(own, tmp_path, result):
     (tmp_path / result).touch()
-    with pytest.raises(ConfigurationError, match="lies in a folder of results, from which no code is run"):
+    with pytest.raises(ConfigurationError, match="is a folder of results, from which no code is run"):
         own("OWN:Resting")
-    assert not any(name.startswith("own_") for name in sys.modules)
+    assert f"own_{tmp_path.name}" not in sys.modules

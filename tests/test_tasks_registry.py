@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.configuration import parse
+from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.engines.native.outside_sources import note_outside, outside_digest
 from caster_gym.envs.native.reference import TaskCode, register_task
 from caster_gym.envs.tensor.task import TorchTask
@@ -126,9 +126,9 @@ def test_weights_are_the_parameters_of_their_names(name):
 def test_an_unknown_task_is_told_which_there_are():
     with pytest.raises(ValueError, match="the task must be 'track', 'follow', 'hold' or 'module:Name' of your own"):
         TorchTask("folow")
-    with pytest.raises(ValueError, match="there is no task 'nowhere:TASK': No module named 'nowhere'"):
+    with pytest.raises(ValueError, match="there is no module 'nowhere' in the working folder or among"):
         find_task("nowhere:TASK")
-    with pytest.raises(ValueError, match=r"'math:pi' must be a caster_gym\.tasks\.task\.Task, got 3\.14"):
+    with pytest.raises(ValueError, match=r"math:pi must be a caster_gym\.tasks\.task\.Task, got 3\.14"):
         find_task("math:pi")
 
 
@@ -142,6 +142,17 @@ def test_a_task_of_ones_own_is_taken_wherever_a_task_is_named(own):
     terms = task.info(outcome.report)["reward_terms"]
     assert list(terms) == ["slowness", "alive"]
     assert torch.equal(outcome.rewards, terms["slowness"] + 1.0)
+
+
+def test_a_task_of_ones_own_is_found_beside_the_file_that_names_it_but_not_among_results(own, tmp_path):
+    sys.path.remove(str(tmp_path))
+    content = {**PATHS, "environment": f"{own}:TASK"}
+    (tmp_path / "run.yaml").touch()
+    with pytest.raises(ConfigurationError, match=r"'environment'.* is a folder of results, from which no code is run"):
+        parse(TaskSettings, content, "task", tmp_path)
+    assert own not in sys.modules
+    (tmp_path / "run.yaml").unlink()
+    assert parse(TaskSettings, content, "task", tmp_path).environment == f"{own}:TASK"
 
 
 def test_two_tasks_cannot_share_a_source():

@@ -8,8 +8,9 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
-from caster_gym.agents.registry import RESULTS, read_agent
+from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import is_yaml, parse, read_yaml
+from caster_gym.own_code import RESULTS
 from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.registry import refuse_imports
 

@@ -1,6 +1,5 @@
 """Typed settings of tasks; the YAML files in configs/tasks hold what differs from the defaults."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
@@ -74,10 +73,7 @@ class ChosenTask(Frozen):
     def _is_a_task(cls, environment: str, info: ValidationInfo) -> str:
         if environment not in TASKS and ":" not in environment:
             raise PydanticCustomError("misread", "should be {kind}", {"kind": KNOWN})
-        if ":" in environment:  # beside the file in which it stands, or where the command runs
-            folder = (info.context or {}).get(FOLDER) or Path.cwd()
-            sys.path += [place for place in (str(Path(folder).absolute()), str(Path.cwd())) if place not in sys.path]
-        find_task(environment)
+        find_task(environment, (info.context or {}).get(FOLDER))
         return environment
 
     @field_validator("task", mode="before")

@@ -7,11 +7,13 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gymnasium import register
 
 from caster_gym.configuration import ConfigurationError
+from caster_gym.own_code import OwnCode
 
 if TYPE_CHECKING:
     from caster_gym.tasks.task import Task
@@ -26,13 +28,18 @@ TASKS = {
 KNOWN = f"{', '.join(map(repr, TASKS))} or 'module:Name' of your own"
 
 
-def find_task(name: "str | Task") -> "Task":
-    """The task of that name, of the form `module:Name`, or itself. Raises ValueError that says which there are."""
+def find_task(name: "str | Task", folder: Path | None = None) -> "Task":
+    """The task of that name, of the form `module:Name`, or itself. Raises ValueError that says which there are.
+
+    folder: of the file that names it, in which its module may lie.
+    """
     if not isinstance(name, str):
         return name
-    if name not in TASKS and ":" not in name:
+    if name in TASKS:
+        return _shipped_task(name)
+    if ":" not in name:
         raise ValueError(f"the task must be {KNOWN}, got {name!r}")
-    return _loaded(TASKS.get(name, name))
+    return _own_task(name, folder)
 
 
 def refuse_imports(name: object, source: str) -> None:
@@ -59,15 +66,19 @@ def register_environments(name: str) -> None:
     register(id=f"{place.partition(':')[2]}-v0", entry_point=f"{place}Env", vector_entry_point=f"{place}VectorEnv")
 
 
-@cache
-def _loaded(place: str) -> "Task":
+def _own_task(reference: str, folder: Path | None) -> "Task":
     from caster_gym.tasks.task import Task
 
-    module, _, name = place.partition(":")
-    try:
-        found: Any = getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"there is no task {place!r}: {error}") from error
-    if not isinstance(found, Task):
-        raise ValueError(f"{place!r} must be a caster_gym.tasks.task.Task, got {found!r}")
-    return found
+    def is_task(thing: object) -> bool:
+        return isinstance(thing, Task)
+
+    kind = OwnCode("environment", "a task", is_task, "a caster_gym.tasks.task.Task", "nothing in it is a Task")
+    task: Task = kind.load(reference, folder)
+    return task
+
+
+@cache
+def _shipped_task(name: str) -> "Task":
+    module, _, attribute = TASKS[name].partition(":")
+    task: Task = getattr(import_module(module), attribute)
+    return task
