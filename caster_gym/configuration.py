@@ -260,11 +260,12 @@ def _item(place: _Place, number: int) -> _Place:
     """An item of the list at a place, called by its kind if the list is: caster 1 of casters."""
     members = _members(*(kind for one in place.members for kind in get_args(one) if kind is not Ellipsis))
     name = ".".join(place.keys)
-    nouns = [one.__name__.lower() for one in members if _is_model(one)]
+    nouns = {re.sub(r"(?<=[a-z])(?=[A-Z])", "-", one.__name__).lower() for one in members if _is_model(one)}
     if not place.keys:
         around = f"number {number} of {place.around}"  # a list in a list
-    elif [name] == [f"{noun}s" for noun in nouns]:
-        around = f"{place.around}{nouns[0]} {number}: "
+    elif {place.keys[-1]} == {f"{noun.replace('-', '_')}s" for noun in nouns}:
+        above = "".join(f"{key}: " for key in place.keys[:-1])
+        around = f"{place.around}{above}{nouns.pop()} {number}: "
     else:
         around = f"{place.around}number {number} of {name!r}: "
     return _Place(around, (), members)

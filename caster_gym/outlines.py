@@ -1,5 +1,6 @@
-"""Outlines of convex shapes: their faces and corners, and what is wrong with one that is not convex."""
+"""Outlines of convex shapes: their faces and corners, and what is wrong with one that is no such shape."""
 
+from cmath import isfinite
 from itertools import combinations
 from math import atan2, hypot, pi
 from typing import NamedTuple, TypeAlias
@@ -8,7 +9,9 @@ import numpy as np
 
 Corners: TypeAlias = tuple[tuple[float, float], ...]
 
+LEAST_EDGE = 1e-6  # [m] of corners that count as different
 _LEAST_TURN = 1e-9  # [rad] at a corner
+_SLACK = 1e-9  # [-] of unit normals, and of corners on faces as a share of their coordinates: rounding and more
 
 
 class Outline(NamedTuple):
@@ -25,7 +28,15 @@ class Outline(NamedTuple):
 
 
 def convex(corners: Corners) -> Outline:
-    """A convex polygon listed counter-clockwise, or a line of two corners, which has a face on either side."""
+    """A convex polygon listed counter-clockwise, or a line of two corners, which has a face on either side.
+
+    Raises ValueError that says which corner is wrong, and how. Anything rounder is a polygon with a radius:
+    `convex(corners)._replace(radius=0.1)`.
+    """
+    if len(corners) < 2:
+        raise ValueError(f"the corners of an outline must be two or more, got {len(corners)}")
+    if fault := polygon_fault(corners):
+        raise ValueError(f"the corners of an outline {fault}")
     faces = []
     for (x, y), (next_x, next_y) in zip(corners, corners[1:] + corners[:1], strict=True):
         length = hypot(next_x - x, next_y - y)
@@ -34,14 +45,48 @@ def convex(corners: Corners) -> Outline:
     return Outline(tuple(faces), corners, 0.0)
 
 
+def outline_fault(outline: object) -> str | None:
+    """Why this is not the outline of a convex shape, as far as it can be seen; None if it is."""
+    if not isinstance(outline, Outline):
+        return f"must be an Outline, as convex((corner, corner, …)) gives, got {outline!r}"
+    try:
+        faces = np.array(outline.faces, dtype=np.float64).reshape(len(outline.faces), 3)
+        corners = np.array(outline.corners, dtype=np.float64).reshape(len(outline.corners), 2)
+        radius = float(outline.radius)
+    except (TypeError, ValueError):
+        return f"must have faces (n_x, n_y, offset), corners (x, y) and a radius, got {outline!r}"
+    if not (np.isfinite(faces).all() and np.isfinite(corners).all() and 0.0 <= radius < np.inf):
+        return f"must have finite numbers and no negative radius, got {outline!r}"
+    if not len(faces) + len(corners):
+        return "must have a face or a corner, got neither"
+    if (abs(np.hypot(*faces[:, :2].T) - 1.0) > _SLACK).any():
+        return f"must have normals of unit length, got the faces {outline.faces}"
+    ahead = corners @ faces[:, :2].T - faces[:, 2]  # [m] (corner, face)
+    if (ahead > LEAST_EDGE + _SLACK * abs(corners).max(initial=0.0)).any():
+        corner, face = np.unravel_index(ahead.argmax(), ahead.shape)
+        return (
+            f"must have all corners behind all faces, but corner {corner + 1} lies {ahead.max():.4g} m in front of "
+            f"face {face + 1}"
+        )
+    return None
+
+
 def polygon_fault(corners: Corners) -> str | None:
-    """Why these are not the corners of a convex polygon in counter-clockwise order, and where; None if they are."""
+    """Why these are not the corners of a convex polygon in counter-clockwise order, and where; None if they are.
+
+    Two corners are a polygon with two edges on the same line.
+    """
     points = [complex(*corner) for corner in corners]
+    if not all(map(isfinite, points)):
+        i = next(i for i, point in enumerate(points) if not isfinite(point))
+        return f"must be finite numbers, got {_corner(i, points)}"
     count = len(points)
     edges = [points[(i + 1) % count] - points[i] for i in range(count)]
     for i, edge in enumerate(edges):
-        if abs(edge) < 1e-6:
+        if abs(edge) < LEAST_EDGE:
             return f"must all differ, but {_corner(i, points)} is the same as corner {(i + 1) % count + 1}"
+    if count == 2:
+        return None
     turns = [_angle(edges[i - 1], edges[i]) for i in range(count)]
     if min(turns) > _LEAST_TURN and abs(sum(turns) - 2.0 * pi) < 1e-6:
         return None

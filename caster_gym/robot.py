@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, mo
 from caster_gym.arrays import Array
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.floor import GREATEST
-from caster_gym.outlines import Outline, convex, polygon_fault
+from caster_gym.outlines import Corners, Outline, convex, polygon_fault
 from caster_gym.plausibility import warn_if_implausible
 
 
@@ -99,12 +99,17 @@ class Footprint(Frozen):
     disc: PositiveFloat | None = None  # [m]
     polygon: Annotated[tuple[tuple[float, float], ...], Field(min_length=3)] | None = None  # [m] counter-clockwise
 
+    @field_validator("polygon")
+    @classmethod
+    def _convex_and_counter_clockwise(cls, polygon: Corners | None) -> Corners | None:
+        if polygon is not None and (fault := polygon_fault(polygon)):
+            raise ValueError(fault)
+        return polygon
+
     @model_validator(mode="after")
-    def _one_shape_and_convex(self) -> Self:
+    def _one_shape(self) -> Self:
         if (self.disc is None) == (self.polygon is None):
             raise ValueError("give exactly one of 'disc' (a radius) and 'polygon' (its corners)")
-        if self.polygon is not None and polygon_fault(self.polygon):
-            raise ValueError("must be a convex polygon with its corners listed counter-clockwise")
         return self
 
     @property

@@ -1,13 +1,15 @@
 """caster_gym.arena.arena and .outlines: reading arenas, and saying what is wrong with one."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from caster_gym.arena import Arena, read_arena
-from caster_gym.configuration import ConfigurationError
+from caster_gym.arena import Arena, distances, read_arena
+from caster_gym.configuration import ConfigurationError, Frozen, parse
+from caster_gym.outlines import Outline, convex
+from caster_gym.robot import load_robot
 
 FULL: dict[str, Any] = {
     "room": [[-2, -1], [2, 1]],
@@ -109,8 +111,8 @@ STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) /
             r"must all differ, but corner 4 at \(0, 0\) m is the same as corner 1",
         ),
         ({"polygons": [{"corners": [[0, 0], [1, 0]]}]}, "'corners' should have at least 3 items, got 2"),
-        ({"half_planes": [{"point": [0, 0], "normal": [0, 0]}]}, r"'half_planes': 'normal' must have a direction"),
-        ({"walls": [{"start": [1, 2], "end": [1, 2]}]}, r"wall 1: start and end must differ, got \(1, 2\) m"),
+        ({"half_planes": [{"point": [0, 0], "normal": [0, 0]}]}, "arena: half-plane 1: 'normal' must have a direction"),
+        ({"walls": [{"start": [1, 2], "end": [1, 2]}]}, r"wall 1: 'start' and 'end' must differ, got \(1, 2\) m"),
         ({"walls": [{"start": [1, 2], "end": [1, "b"]}]}, "wall 1: number 2 of 'end' should be a number, got 'b'"),
         ({"pillars": [{"centre": [0, 0], "radius": 0}]}, "pillar 1: 'radius' should be greater than 0, got 0"),
         ({"pillars": [{"centre": [0, 0], "radios": 1}]}, "unknown key 'radios'; did you mean 'radius'"),
@@ -121,6 +123,11 @@ STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) /
         ({"restitution": 1.2}, "'restitution' should be less than or equal to 1, got 1.2"),
         ({"impact_law": "newton"}, "'impact_law' should be 'stronge' or 'chatterjee_ruina', got 'newton'"),
         ({"pilars": []}, "arena: unknown key 'pilars'; did you mean 'pillars'"),
+        (
+            {"obstacles": []},
+            "unknown key 'obstacles'; they stand by their kinds: 'room', 'half_planes', 'walls', 'pillars', "
+            "'polygons', 'beside'",
+        ),
         ("nowhere.yaml", r"there is no file 'nowhere\.yaml'"),
         ("room", "an arena is a mapping or the name of a YAML file, got 'room'"),
         (3, "an arena is a mapping or the name of a YAML file, got 3"),
@@ -129,3 +136,80 @@ STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) /
 def test_what_is_no_arena_is_refused_by_name(arena, message):
     with pytest.raises(ConfigurationError, match=message):
         read_arena(arena)
+
+
+def yard(outline):
+    """An arena with one obstacle of a kind of one's own, which has this outline."""
+
+    class Crate(Frozen):
+        @property
+        def outline(self):
+            return outline()
+
+        def __str__(self):
+            return "at the gate"
+
+    class Yard(Arena):
+        @property
+        def obstacles(self):
+            return ((f"crate 1 {Crate()}", Crate()),)
+
+    return Yard
+
+
+@pytest.mark.parametrize(
+    ("outline", "message"),
+    [
+        (lambda: None, r"its outline must be an Outline, as convex\(\(corner, corner, …\)\) gives, got None"),
+        (lambda: 0.2, "its outline must be an Outline, .* got 0.2"),
+        (lambda: convex(((0, 0), (0, 1), (1, 0))), "the corners of an outline must be listed counter-clockwise"),
+        (lambda: convex(((0, 0), (2, 0), (1, 0.5), (0, 2))), r"it bends inwards at corner 3 at \(1, 0\.5\) m"),
+        (lambda: convex(((1, 1), (1, 1))), r"must all differ, but corner 1 at \(1, 1\) m is the same as corner 2"),
+        (lambda: convex(((1, 1),)), "the corners of an outline must be two or more, got 1"),
+        (lambda: convex(((0, 0), (1, 0), (np.nan, 1))), "must be finite numbers, got corner 3 at"),
+        (lambda: Outline((), ((np.nan, 0.0),), 0.1), "must have finite numbers and no negative radius"),
+        (lambda: Outline((), ((0.0, 0.0),), np.nan), "must have finite numbers and no negative radius"),
+        (lambda: Outline((), ((0.0, 0.0),), -0.1), "must have finite numbers and no negative radius"),
+        (lambda: Outline((), cast(Any, [3.0]), 0.1), r"must have faces \(n_x, n_y, offset\), corners \(x, y\)"),
+        (lambda: Outline((), (), 0.1), "must have a face or a corner, got neither"),
+        (lambda: Outline(((3.0, 4.0, 0.0),), (), 0.0), "must have normals of unit length"),
+        (lambda: Outline(((1.0, 0.0, 0.0),), ((0.5, 0.0),), 0.0), "corner 1 lies 0.5 m in front of face 1"),
+        (
+            lambda: 1 / 0,
+            r"cannot be worked out: ZeroDivisionError: division by zero \(.*test_arena_arena.py, line \d+\)",
+        ),
+    ],
+)
+def test_an_obstacle_of_ones_own_without_a_convex_outline_is_refused_by_name(outline, message):
+    with pytest.raises(ConfigurationError, match=f"arena: crate 1 at the gate: .*{message}"):
+        parse(yard(outline), {}, "arena")
+
+
+def test_an_obstacle_without_any_outline_is_refused_by_name():
+    class Yard(Arena):
+        @property
+        def obstacles(self):
+            return (("crate 1", Frozen()),)
+
+    with pytest.raises(ConfigurationError, match=r"arena: crate 1: its outline must be an Outline, .* got None"):
+        parse(Yard, {}, "arena")
+
+
+def test_walls_of_any_thickness_are_where_they_say():
+    """Too thin to be told from a line, a wall is one; the gap of a disc of 0.15 m beside it, by hand."""
+    robot = load_robot("chung2008")
+    for thickness in (0.0, 1e-12, 5e-7, 1e-6, 1e-3, 1.0):
+        arena = read_arena({"walls": [{"start": [2, -3], "end": [2, 3], "thickness": thickness}]})
+        gaps, _ = distances(arena, robot, [[0.0, 0.0, 0.0]])
+        assert_allclose(gaps[0, 0], 2.0 - 0.15 - thickness / 2, atol=1e-6)  # half of what is too thin to be told
+
+
+def test_obstacles_are_named_alike_wherever_the_arena_stands():
+    class Scene(Frozen):
+        arena: Arena
+
+    wrong = {"half_planes": [{"point": [0, 0], "normal": [0, 0]}], "pillars": [{"centre": [0, 0], "radius": 0}]}
+    with pytest.raises(
+        ConfigurationError, match=r"scene: arena: half-plane 1: 'normal' must .*; arena: pillar 1: 'rad"
+    ):
+        parse(Scene, {"arena": wrong}, "scene")

@@ -83,11 +83,17 @@ REFUSED = {
         ["'actuation' must be 'all' or a list of joints", "got 'some'"],
     ),
     "numbers for joints": (lambda r: r.update(actuation=[1, 2]), ["must be 'all' or a list of joints", "got [1, 2]"]),
-    "dent in the outline": (polygon((0, 0), (1, 0), (0.2, 0.2), (0, 1)), ["footprint", "convex", "0.2"]),
-    "clockwise outline": (polygon((0, 0), (0, 1), (1, 1), (1, 0)), ["footprint", "counter-clockwise"]),
+    "dent in the outline": (
+        polygon((0, 0), (1, 0), (0.2, 0.2), (0, 1)),
+        ["'platform.footprint.polygon' must be convex, but it bends inwards at corner 3 at (0.2, 0.2)"],
+    ),
+    "clockwise outline": (
+        polygon((0, 0), (0, 1), (1, 1), (1, 0)),
+        ["'platform.footprint.polygon' must be listed counter-clockwise"],
+    ),
     "outline that crosses itself": (
         polygon(*[(np.cos(a).item(), np.sin(a).item()) for a in 4.0 * np.pi / 5.0 * np.arange(5)]),
-        ["footprint", "convex"],
+        ["'platform.footprint.polygon' must not cross itself, but its edges from corner 1 and from corner 3 cross"],
     ),
     "outline of two corners": (polygon((0, 0), (1, 0)), ["footprint.polygon", "at least 3"]),
     "two outlines": (

@@ -8,7 +8,8 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, m
 
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.mechanics.impulse import ImpactLaw
-from caster_gym.outlines import Outline, convex, polygon_fault
+from caster_gym.outlines import LEAST_EDGE, Outline, convex, outline_fault, polygon_fault
+from caster_gym.own_errors import in_own_code
 
 FARTHEST = 1e6  # [m] from the origin
 
@@ -54,8 +55,8 @@ class Wall(Frozen):
 
     @model_validator(mode="after")
     def _has_a_length(self) -> Self:
-        if abs(complex(*self.end) - complex(*self.start)) < 1e-6:
-            raise ValueError(f"start and end must differ, got {_place(self.start)} and {_place(self.end)}")
+        if abs(complex(*self.end) - complex(*self.start)) < LEAST_EDGE:
+            raise ValueError(f"'start' and 'end' must differ, got {_place(self.start)} and {_place(self.end)}")
         return self
 
     def __str__(self) -> str:
@@ -63,10 +64,10 @@ class Wall(Frozen):
 
     @property
     def outline(self) -> Outline:
-        """Two corners and two faces; four of each with a thickness."""
+        """Two corners and two faces; four of each with a thickness that can be told from none."""
         start, end = complex(*self.start), complex(*self.end)
         left = 0.5j * self.thickness * (end - start) / abs(end - start)
-        corners = (start - left, end - left, end + left, start + left) if self.thickness > 0.0 else (start, end)
+        corners = (start - left, end - left, end + left, start + left) if self.thickness >= LEAST_EDGE else (start, end)
         return convex(tuple((corner.real, corner.imag) for corner in corners))
 
 
@@ -145,7 +146,6 @@ class Arena(Frozen):
         "impact_friction": "friction",
         "coefficient_of_restitution": "restitution",
         "law": "impact_law",
-        "obstacles": "they stand by their kinds: 'walls', 'pillars', 'polygons', 'half_planes', 'room', 'beside'",
         "floor_friction": "'friction' is that between hull and obstacles; wheels slip on the 'floor' of the task",
         "floor": "the 'floor' belongs to the task",
     }
@@ -166,6 +166,15 @@ class Arena(Frozen):
         if room is not None and not (room[0][0] < room[1][0] and room[0][1] < room[1][1]):
             raise ValueError("must be [[x_min, y_min], [x_max, y_max]] with each minimum below its maximum")
         return room
+
+    @model_validator(mode="after")
+    def _obstacles_have_outlines(self) -> Self:
+        for name, obstacle in self.obstacles:
+            with in_own_code(f"{name}: its outline cannot be worked out", type(obstacle)):
+                fault = outline_fault(getattr(obstacle, "outline", None))
+            if fault:
+                raise ValueError(f"{name}: its outline {fault}")
+        return self
 
     @property
     def sides(self) -> tuple[HalfPlane, ...]:
@@ -188,6 +197,10 @@ class Arena(Frozen):
         }
         numbered = ((f"{kind} {i} {one}", one) for kind, them in kinds.items() for i, one in enumerate(them, start=1))
         return (*((f"the room's side {end}", side) for end, side in ends), *numbered)
+
+
+_KINDS = [name for name, field in Arena.model_fields.items() if field.default in (None, ())]
+Arena.usual_names = {**Arena.usual_names, "obstacles": f"they stand by their kinds: {', '.join(map(repr, _KINDS))}"}
 
 
 def read_arena(arena: str | Path | Mapping[str, Any] | Arena | None) -> Arena:

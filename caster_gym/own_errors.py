@@ -1,0 +1,30 @@
+"""Code of users that runs here: what it raises is told in a sentence, with the file and the line."""
+
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class OwnCodeError(ValueError):
+    """Code of a user has raised something; the message says whose code it is, what it raised and at which line."""
+
+
+@contextmanager
+def in_own_code(what: str, kind: type) -> Iterator[None]:
+    """Turn whatever is raised within into an OwnCodeError that begins with these words.
+
+    kind: the class whose code runs; of the lines on the way to the error, the last one in its file is named, or the
+    last one at all if none is in it.
+    """
+    try:
+        yield
+    except Exception as error:  # whatever the code of others does
+        raise OwnCodeError(f"{what}: {type(error).__name__}: {error} ({_place(error, kind)})") from error
+
+
+def _place(error: Exception, kind: type) -> str:
+    lines = traceback.extract_tb(error.__traceback__)[1:]  # the first is in this file
+    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    last = [*lines, *(line for line in lines if line.filename == file)][-1]
+    return f"{last.filename}, line {last.lineno}"
