@@ -1,6 +1,7 @@
 """Rooms are closed: who imports what from where."""
 
 import ast
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,3 +55,14 @@ def test_rooms_below_the_agents_do_not_import_them(room):
 def test_what_is_installed_imports_nothing_that_is_not():
     for name, file in modules("caster_gym", "agents").items():
         assert not {one.split(".")[0] for one in imported(file)} & {"papers", "scripts", "tests"}, name
+
+
+def test_types_are_checked_strictly_wherever_there_is_code():
+    """Functions of tests alone need no annotations; agents are seen through the link in caster_gym."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
+    folders = {file.parent.name for file in ROOT.glob("*/*.py") if not file.parent.name.startswith((".", "build"))}
+    assert folders - {"agents", "configs", "findings"} == set(settings["files"])
+    assert (ROOT / "caster_gym" / "agents").resolve() == ROOT / "agents"
+    (tests,) = (one for one in settings["overrides"] if one["module"] == "tests.*")
+    untyped = {"disallow_untyped_defs", "disallow_incomplete_defs", "disallow_untyped_calls"}
+    assert settings["strict"] and tests == {"module": "tests.*", **dict.fromkeys(untyped, False)}
