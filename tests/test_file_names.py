@@ -63,8 +63,9 @@ def test_files_that_name_one_another_are_found_from_anywhere(project, relative):
     target = read_design(str(start / "target.yaml"))
     assert Path(target.robot).samefile(project / "robots" / "mine.yaml")
     points = read_settings(TaskSettings, "tasks", str(start / "points.yaml")).test[0]
-    assert isinstance(points, Spline) and points == target.paths[0]
-    assert points.waypoints == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+    of_target = target.paths[0]
+    assert isinstance(points, Spline) and isinstance(of_target, Spline)
+    assert points.waypoints == of_target.waypoints == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
 
 
 def test_what_was_read_means_the_same_in_another_file(project):
