@@ -34,6 +34,11 @@ AGENTS: Mapping[str, type[AgentSettings]] = {
 
 def read_agent(name: str | Path, changes: Mapping[str, Any] | None = None) -> AgentSettings:
     """Checked settings of an agent, with some fields changed."""
+    if is_python(name):
+        raise ConfigurationError(
+            f"{name} is Python code, not the settings of an agent: give a YAML file with the line "
+            f"'algorithm: {Path(name).stem}:Name', where Name is the class of its settings"
+        )
     path = find("agents", name)
     content = {**read_yaml(path), **(changes or {})}
     algorithm = content.get("algorithm")
@@ -45,6 +50,11 @@ def read_agent(name: str | Path, changes: Mapping[str, Any] | None = None) -> Ag
         known = unknown_name("algorithm", algorithm, AGENTS)
         raise ConfigurationError(f"{path}: {known}; a class of your own is written as module:Name")
     return parse(kind, content, f"{path}, as changed" if changes else str(path), path.parent)
+
+
+def is_python(name: str | Path) -> bool:
+    """Whether a name is that of a Python file, by its suffix."""
+    return Path(name).suffix == ".py"
 
 
 def _own_agent(reference: str, path: Path) -> type[AgentSettings]:
@@ -71,6 +81,6 @@ _OWN = OwnCode(
     "algorithm",
     "a class",
     _is_agent,
-    "a class derived from ControllerSettings or LearnerSettings",
+    "a class of your own, derived from ControllerSettings or LearnerSettings",
     "no class in it has settings of an agent",
 )

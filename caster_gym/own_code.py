@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from caster_gym.configuration import ConfigurationError, did_you_mean
+from caster_gym.own_errors import place_of
 
 RESULTS = ("policy.yaml", "run.yaml")  # files that mark a folder as that of a policy or of a run
 
@@ -27,6 +28,9 @@ class OwnCode(NamedTuple):
     def load(self, reference: str, folder: Path | None = None) -> Any:
         """What `module:Name` means in a file of this folder. Raises ConfigurationError that does not name the file."""
         module, _, name = reference.partition(":")
+        if module.endswith(".py"):
+            better = f"{Path(module).stem}:{name}"
+            raise ConfigurationError(f"a module is named without .py: {self.key} {better}, got {reference!r}")
         if not all(part.isidentifier() for part in (*module.split("."), name)):
             raise ConfigurationError(f"{self.kind} of your own is written as module:Name, got {self.key} {reference!r}")
         folder = folder and folder.absolute()
@@ -38,12 +42,13 @@ class OwnCode(NamedTuple):
         places = [str(place) for place in (folder, Path.cwd()) if place is not None]
         sys.path += [place for place in dict.fromkeys(places) if place not in sys.path]
         contents = vars(_imported(module, folder))
+        known = [one for one, thing in contents.items() if self.fits(thing)]
         if name not in contents:
-            known = [one for one, thing in contents.items() if self.fits(thing)]
             advice = did_you_mean(name, known) if known else self.nothing
             raise ConfigurationError(f"module {module!r} has no {name!r}; {advice}")
         if not self.fits(contents[name]):
-            raise ConfigurationError(f"{reference} must be {self.wanted}, got {contents[name]!r}")
+            advice = f"; there is {' or '.join(map(repr, known))} in the same module" if known else ""
+            raise ConfigurationError(f"{reference} must be {self.wanted}, got {contents[name]!r}{advice}")
         return contents[name]
 
 
@@ -58,4 +63,6 @@ def _imported(name: str, folder: Path | None) -> Any:
             f"there is no module {error.name!r} in {beside}the working folder or among the installed packages"
         ) from error
     except Exception as error:  # whatever the code of others does
-        raise ConfigurationError(f"module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
+        raise ConfigurationError(
+            f"module {name!r} cannot be imported: {type(error).__name__}: {error} ({place_of(error)})"
+        ) from error

@@ -17,14 +17,15 @@ def in_own_code(what: str, kind: type) -> Iterator[None]:
     kind: the class whose code runs; of the lines on the way to the error, the last one in its file is named, or the
     last one at all if none is in it.
     """
+    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
     try:
         yield
     except Exception as error:  # whatever the code of others does
-        raise OwnCodeError(f"{what}: {type(error).__name__}: {error} ({_place(error, kind)})") from error
+        raise OwnCodeError(f"{what}: {type(error).__name__}: {error} ({place_of(error, file)})") from error
 
 
-def _place(error: Exception, kind: type) -> str:
-    lines = traceback.extract_tb(error.__traceback__)[1:]  # the first is in this file
-    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+def place_of(error: Exception, file: str | None = None) -> str:
+    """The file and the line of an error: the last one in this file, if any is in it."""
+    lines = traceback.extract_tb(error.__traceback__)
     last = [*lines, *(line for line in lines if line.filename == file)][-1]
     return f"{last.filename}, line {last.lineno}"

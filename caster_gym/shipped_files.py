@@ -31,12 +31,17 @@ def find(kind: str, name: str | Path) -> Path:
         return path
     name = str(name)
     if name not in names_of(kind):
-        own = next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
+        own = own_file(name)
         known = f"known are {', '.join(names_of(kind))}, or give the path of a YAML file"
         raise ConfigurationError(
             f"there is no {name!r} in {kind}; {f'did you mean the file {own!r}?' if own else known}"
         )
     return _folder_of(kind) / f"{name}.yaml"
+
+
+def own_file(name: str) -> str | None:
+    """The YAML file that was perhaps meant by a name without its suffix, if there is one."""
+    return next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
 
 
 def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:

@@ -1,8 +1,12 @@
 """caster_gym.agents.commands.command_line: mistakes get a sentence, not a traceback, and no results are lost."""
 
+import io
+import sys
+
 import pytest
 import yaml
 
+from caster_gym.agents.commands.command_line import progress
 from caster_gym.report.run_folder import MARK
 from tests.command_calls import TASK, TINY, assert_refused
 
@@ -15,9 +19,15 @@ from tests.command_calls import TASK, TINY, assert_refused
         (["train", "--task", "missing.yaml"], "there is no file 'missing.yaml'"),
         (["train", "computed_torque"], "agent 'computed_torque' does not learn"),
         (["evaluate", "nobody"], "neither a folder of a policy nor a model-based agent called 'nobody'; such are comp"),
+        (
+            ["evaluate", "code/pushers.py"],
+            "code/pushers.py is Python code, not the settings of an agent: give a YAML file with the line 'algorithm: "
+            "pushers:Name'",
+        ),
+        (["train", "pushers.py"], "pushers.py is Python code, not the settings of an agent"),
         (["evaluate", "ppo"], "agent 'ppo' must be trained first"),
         (["evaluate", "computed_torque", "--task", "nowhere"], "there is no 'nowhere' in tasks"),
-        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, patch_of_ice,"),
+        (["benchmark", "--config", "nothing"], "there is no 'nothing' in benchmarks; known are follow, "),
         (["train", "--set", "steps"], "--set needs KEY=VALUE, got 'steps'"),
         (["train", "--set", "=3"], "--set needs KEY=VALUE, got '=3'"),
         (
@@ -160,3 +170,19 @@ def test_commands_try_their_folder_before_they_compute(call, tmp_path, monkeypat
     ):
         monkeypatch.setattr(place, lambda *_, **__: pytest.fail("computed before the folder was tried"))
     assert_refused(call(*command, "--out", out), "choose another --out")
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(("stream", "shown"), [(io.StringIO, False), (Terminal, True)])
+def test_progress_is_shown_in_a_terminal_and_not_in_a_file(monkeypatch, stream, shown):
+    written = stream()
+    monkeypatch.setattr(sys, "stderr", written)
+    with progress(total=3, desc="parts", mininterval=0.0) as show:
+        for done in (1, 2, 3):
+            show(done, "so far")
+    assert ("parts: 100%" in written.getvalue()) is shown
+    assert bool(written.getvalue()) is shown

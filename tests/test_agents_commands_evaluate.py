@@ -109,3 +109,31 @@ def test_folders_that_hold_policies_say_where(trained, call, tmp_path):
         assert_refused(call("evaluate", given, "--task", "task.yaml", "--out", "results"), message)
     for advised in ("runs/first/best", last):
         assert call("evaluate", advised, "--task", "task.yaml", "--out", f"results/{advised}").exit_code == 0
+
+
+OWN = """
+import numpy as np
+from caster_gym.agents.control.protocol import ControllerSettings
+
+class Pusher:
+    name = "pusher"
+    def act(self, observations):
+        return np.linalg.inv(np.zeros((2, 2)))
+
+class Pushing(ControllerSettings):
+    def controller(self, layout, period):
+        return Pusher()
+"""
+
+
+def test_what_a_controller_of_ones_own_raises_names_it_with_its_file_and_line(call, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path / "elsewhere")  # restores sys.path afterwards
+    (tmp_path / "own_pushers.py").write_text(OWN, encoding="utf-8")
+    (tmp_path / "stiff.yaml").write_text("algorithm: own_pushers:Pushing", encoding="utf-8")
+    result = call("evaluate", "stiff.yaml", "--task", "task.yaml", "--out", "results")
+    assert_refused(result, "agent 'stiff.yaml' (own_pushers:Pushing): its method act: LinAlgError: Singular matrix (")
+    assert f"{tmp_path / 'own_pushers.py'}, line 8)" in result.stderr
+    assert not (tmp_path / "results").exists()
+    assert_refused(
+        call("evaluate", "stiff", "--task", "task.yaml"), "called 'stiff'; did you mean the file 'stiff.yaml'?"
+    )

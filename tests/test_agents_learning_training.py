@@ -1,6 +1,7 @@
 """caster_gym.agents.learning.training: runs leave everything behind, repeat, survive an interruption, and learn."""
 
 import csv
+import inspect
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,12 +17,14 @@ from caster_gym.agents.comparison import evaluation
 from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.bundle import load_policy
-from caster_gym.agents.learning.settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings
+from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.agents.learning.training import train
+from caster_gym.agents.learning.training_run import Run
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import parse
 from caster_gym.engines.native.threads import get_threads
 from caster_gym.engines.tensor.threads import DEFAULT
+from caster_gym.own_errors import OwnCodeError
 from caster_gym.shipped_files import read_settings
 from caster_gym.tasks.track.metrics import TrackVerdict, measure
 
@@ -230,3 +233,20 @@ def test_ppo_learns_to_track_paths_it_has_never_seen(tmp_path):
     assert metrics.failed.sum() <= 2
     assert np.nanmean(metrics.position_rmse) < 0.020
     assert np.nanmean(metrics.heading_rmse) < 0.020  # [rad]; measured 0.008, 0.010 and 0.011
+
+
+class Broken(LearnerSettings):
+    """A learner of one's own that does not get far."""
+
+    n_timesteps: int = 100
+
+    def learn(self, run: Run) -> None:
+        raise KeyError("no such layer")
+
+
+def test_what_a_learner_of_ones_own_raises_names_it_with_its_file_and_line(tmp_path):
+    with pytest.raises(OwnCodeError) as caught:
+        train(TASK, Broken(algorithm="search:Broken"), 0, tmp_path, lambda steps, words: None)
+    line = inspect.getsourcelines(Broken.learn)[1] + 1
+    where = f"{__file__}, line {line}"
+    assert str(caught.value) == f"agent 'search:Broken': its method learn: KeyError: 'no such layer' ({where})"

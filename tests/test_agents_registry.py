@@ -144,11 +144,19 @@ def test_the_source_of_an_agent_is_its_module_and_version(own, tmp_path):
         ),
         ("OWN:Restin", r"has no 'Restin'; did you mean 'Resting'\?"),
         ("json:Resting", "module 'json' has no 'Resting'; no class in it has settings of an agent"),
-        ("OWN:LIMIT", "LIMIT must be a class derived from ControllerSettings or LearnerSettings, got 3.0"),
-        ("OWN:Still", "Still must be a class derived from ControllerSettings or LearnerSettings, got <class"),
-        ("OWN:ControllerSettings", "must be a class derived from ControllerSettings"),
+        ("OWN:LIMIT", "LIMIT must be a class of your own, derived from ControllerSettings or LearnerSettings, got 3.0"),
+        (
+            "OWN:Still",
+            "Still must be a class of your own, derived from .*, got <class .*; there is 'Resting' or 'Unfinished' in "
+            "the same module",
+        ),
+        ("OWN:ControllerSettings", "must be a class of your own, derived from ControllerSettings"),
         ("OWN:Unfinished", "Unfinished must define the method learn"),
-        ("broken_OWN:Resting", "cannot be imported: ZeroDivisionError: division by zero"),
+        ("OWN.py:Resting", r"a module is named without \.py: algorithm own_.*:Resting, got 'own_.*\.py:Resting'"),
+        (
+            "broken_OWN:Resting",
+            r"cannot be imported: ZeroDivisionError: division by zero \(.*broken_own_.*\.py, line 1\)",
+        ),
         ("needy_OWN:Resting", "needs 'no_such_library', which is not installed"),
         (":Resting", "is written as module:Name, got algorithm ':Resting'"),
         ("OWN:", "is written as module:Name, got algorithm"),

@@ -94,7 +94,9 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
 
     with limit_threads(threads):
         tuned = {
-            name: tune(agent, validation) for name, agent in agents.items() if isinstance(agent, ControllerSettings)
+            name: tune(agent, validation, name)
+            for name, agent in agents.items()
+            if isinstance(agent, ControllerSettings)
         }
     train_all(jobs, threads)
     ready: dict[str, list[tuple[Agent, int | None]]] = {

@@ -27,6 +27,7 @@ from caster_gym.agents.registry import read_agent
 from caster_gym.report.run_folder import begun, check_file
 from caster_gym.shipped_files import read_settings
 
+AGENTS_THERE = "Folder of a trained policy, name of a model-based agent, or YAML file of a controller of your own"
 MJCF_SUFFIXES = (".xml", ".mjcf")
 
 app = typer.Typer(
@@ -92,7 +93,7 @@ def train(
 
 @app.command()
 def evaluate(
-    policy: Annotated[str, typer.Argument(help="Folder of a trained policy, or name of a model-based agent.")],
+    policy: Annotated[str, typer.Argument(help=f"{AGENTS_THERE}.")],
     task: TrainedTask = None,
     starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
     out: Out = Path("runs/evaluate"),
@@ -133,10 +134,7 @@ def benchmark(
 def watch(
     agent: Annotated[
         str,
-        typer.Argument(
-            help="Folder of a trained policy, name of a model-based agent, or keyboard: W, A, S, D or arrows drive, "
-            "Q and E turn."
-        ),
+        typer.Argument(help=f"{AGENTS_THERE}, or keyboard: W, A, S, D or arrows drive, Q and E turn."),
     ] = "computed_torque",
     task: TrainedTask = None,
     path: Annotated[

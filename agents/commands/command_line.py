@@ -68,12 +68,15 @@ def files_among(*names: object) -> tuple[Path, ...]:
 
 @contextmanager
 def progress(**options: Any) -> Iterator[Callable[..., None]]:
-    """show(done, words) for a bar that appears when there is something to show, and not above a refusal."""
+    """show(done, words) for a bar that appears when there is something to show, and not above a refusal.
+
+    Into a file or a pipe nothing is written.
+    """
     bars: list[tqdm[Any]] = []
 
     def show(done: int, words: str = "") -> None:
         if not bars:
-            bars.append(tqdm(**options))
+            bars.append(tqdm(**options, disable=None))
         bars[0].update(done - bars[0].n)
         bars[0].set_postfix_str(words)
 

@@ -8,10 +8,10 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
-from caster_gym.agents.registry import read_agent
+from caster_gym.agents.registry import is_python, read_agent
 from caster_gym.configuration import is_yaml, parse, read_yaml
 from caster_gym.own_code import RESULTS
-from caster_gym.shipped_files import names_of, read_settings
+from caster_gym.shipped_files import names_of, own_file, read_settings
 from caster_gym.tasks.registry import refuse_imports
 
 DEFAULT_TASK = "track"
@@ -38,16 +38,15 @@ def choose_agent(name: str, settings: TaskSettings, batch: Batch) -> ChosenAgent
     Raises ValueError for a policy that does not fit the batch, and for an agent that must be trained first.
     """
     folder = Path(name).expanduser()
-    named = name in names_of("agents") or (is_yaml(name) and folder.name not in RESULTS)
+    named = name in names_of("agents") or is_python(name) or (is_yaml(name) and folder.name not in RESULTS)
     known = read_agent(name) if named else None
     if isinstance(known, ControllerSettings) and not (folder / DESCRIPTION).is_file():
-        return ChosenAgent(*tune(known, evaluation_batch(settings, settings.validation, starts=1)))
+        return ChosenAgent(*tune(known, evaluation_batch(settings, settings.validation, starts=1), name))
     if known is None and not folder.exists() and len(folder.parts) == 1:
         model_based = [one for one in names_of("agents") if isinstance(read_agent(one), ControllerSettings)]
-        raise ValueError(
-            f"there is neither a folder of a policy nor a model-based agent called {name!r}; such are "
-            f"{', '.join(model_based)}"
-        )
+        own = own_file(name)
+        advice = f"did you mean the file {own!r}?" if own else f"such are {', '.join(model_based)}"
+        raise ValueError(f"there is neither a folder of a policy nor a model-based agent called {name!r}; {advice}")
     if known is not None and not folder.is_dir():
         raise ValueError(
             f"agent {name!r} must be trained first: `caster-gym train {name} --out RUN` writes its policy to RUN/best, "

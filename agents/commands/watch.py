@@ -73,7 +73,9 @@ def watch(
         writer = None if save is None else stack.enter_context(recording(save, 1.0 / period, overwrite))
         viewer = stack.enter_context(_open(Viewer(mode, size, 1.0 / period, around)))
         bar = stack.enter_context(
-            tqdm(total=min(end, longest) + 1, unit="frame", desc=controller.name, disable=save is None)
+            tqdm(
+                total=min(end, longest) + 1, unit="frame", desc=controller.name, disable=True if save is None else None
+            )
         )
         shown = 0
         begin()

@@ -38,7 +38,7 @@ def compare(contenders: Sequence[Contender], test: Batch, seed: int, settling: f
     settling = how.settling if settling is None else settling
     results: list[Result] = []
     shown: dict[str, Episodes] = {}
-    for name, agent, of_agent in tqdm(contenders, desc="evaluating", unit="agent"):
+    for name, agent, of_agent in tqdm(contenders, desc="evaluating", unit="agent", disable=None):
         episodes = roll_out(agent, test, seed)
         shown.setdefault(name, episodes)
         results.append(Result(name, of_agent, episodes.names, how.measure(episodes, settling)))

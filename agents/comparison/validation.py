@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
 from caster_gym.agents.comparison.task_settings import in_brief
+from caster_gym.agents.control.own_controller import candidates_of, controller_of
 from caster_gym.agents.control.protocol import Agent, ControllerSettings
 from caster_gym.report.tables import write_csv
 
@@ -39,8 +40,11 @@ def verdict_on(agent: Agent, validation: Batch) -> Any:
     return how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
 
 
-def tune(settings: ControllerSettings, validation: Batch) -> Tuned:
-    """The controller whose settings, of the candidates, do best on validation paths, as policies are chosen there."""
+def tune(settings: ControllerSettings, validation: Batch, called: str | None = None) -> Tuned:
+    """The controller whose settings, of the candidates, do best on validation paths, as policies are chosen there.
+
+    called: what messages call the agent, its algorithm if nothing else.
+    """
     plain = bare(validation)
     if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
         raise ValueError(
@@ -48,7 +52,8 @@ def tune(settings: ControllerSettings, validation: Batch) -> Tuned:
             "that out of its wrappers"
         )
     layout, period = plain.engine.layout, plain.task.control_period
-    tried = [Tuned(one.controller(layout, period), one) for one in settings.candidates()]
+    called = called or settings.algorithm
+    tried = [Tuned(controller_of(one, layout, period, called), one) for one in candidates_of(settings, called)]
     return max(tried, key=lambda one: verdict_on(one.controller, validation).merit) if len(tried) > 1 else tried[0]
 
 

@@ -23,7 +23,10 @@ class Agent(Protocol):
         ...
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Actions (robots, driven joints) in −1 … 1 for observations (robots, size)."""
+        """Actions (robots, driven joints) in −1 … 1 for observations (robots, size).
+
+        Numbers beyond ±1 are clipped, and count as saturated.
+        """
         ...
 
 
@@ -31,6 +34,11 @@ class AgentSettings(Frozen):
     """Settings of an agent, as its YAML file gives them."""
 
     algorithm: str  # a name in caster_gym.agents.registry, or module:Name of a class like this one
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a class of a user's own, named as module:Name."""
+        return ":" in self.algorithm
 
     @property
     def source(self) -> dict[str, str]:

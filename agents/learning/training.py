@@ -7,7 +7,7 @@ import multiprocessing
 import queue
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training_run import Report, Run
 from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
+from caster_gym.own_errors import in_own_code
 from caster_gym.report.provenance import write_provenance
 
 
@@ -32,7 +33,7 @@ def train(
     run = Run(folder, task, settings, seed, report)
     completed = False
     try:
-        with limit_threads(threads):
+        with limit_threads(threads), _told(settings):
             settings.learn(run)
         completed = True
     finally:
@@ -52,6 +53,13 @@ def train(
     if run.best is None:
         raise ValueError(f"{settings.algorithm} has learned nothing: its method learn must call run.finish at the end")
     return run.best
+
+
+def _told(settings: LearnerSettings) -> AbstractContextManager[None]:
+    """What a learner of a user's own raises becomes a sentence with its place; others say what they have to."""
+    if not settings.is_own:
+        return nullcontext()
+    return in_own_code(f"agent {settings.algorithm!r}: its method learn", type(settings))
 
 
 class Job(NamedTuple):
@@ -99,7 +107,8 @@ def _raise_errors(futures: Sequence["Future[None]"]) -> None:
 @contextmanager
 def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
     done = [0] * len(jobs)
-    with tqdm(total=sum(job.agent.n_timesteps for job in jobs), desc="training", unit="step", unit_scale=True) as bar:
+    total = sum(job.agent.n_timesteps for job in jobs)
+    with tqdm(total=total, desc="training", unit="step", unit_scale=True, disable=None) as bar:
 
         def show(job: int, steps: int, verdict: str) -> None:
             done[job] = min(steps, jobs[job].agent.n_timesteps)
