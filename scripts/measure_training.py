@@ -160,7 +160,7 @@ def empty_cache() -> Iterator[None]:
 def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
     """PPO on our robots and on free ones, with the same settings."""
     ours = SB3VecEnv(training_batch(task, settings.n_envs))
-    longest = round(float(np.mean(bare(ours.batch).engine.plan.guide.spans[:, 2])))
+    longest = round(float(np.mean(bare(ours.batch).engine.plan.source.spans[:, 2])))
     free, round_ = FreeVecEnv(ours, longest), settings.n_envs * settings.n_steps
     return [
         Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))

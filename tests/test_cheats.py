@@ -50,7 +50,7 @@ def test_full_torque_earns_little(task):
 def test_computed_torque_earns_most_of_what_there_is(task):
     """Of progress and quality, beside the term `alive`; at the start there is the displacement to be overcome."""
     batch, honest = task
-    steps = batch.engine.plan.guide.spans[np.arange(ROBOTS) % 4, 2]
+    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, 2]
     alive = batch.task.effort_weight + batch.task.impact_weight
     assert (honest - alive * steps > 0.7 * steps).all()
 
@@ -58,7 +58,7 @@ def test_computed_torque_earns_most_of_what_there_is(task):
 def test_a_parked_robot_earns_hardly_more_than_alive():
     """What little effort parking takes, and up to 3 cm of way from the start, which count in full once."""
     batch = CasterFollowVectorEnv(ROBOTS, path=PATHS, arena=ARENA)
-    steps = batch.engine.plan.guide.spans[np.arange(ROBOTS) % 4, 2]
+    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, 2]
     earned = scores(cheat(batch, "park"), batch, SEED)
     assert (earned > 0.51 * steps).all()
     assert (earned < 0.52 * steps + 1.5).all()

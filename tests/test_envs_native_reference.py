@@ -17,7 +17,7 @@ class Course:
     """The table of a path, read by interpolation of another library."""
 
     def __init__(self, env, path=0):
-        self.table, self.spacing = env.engine.plan.tables[path], float(env.engine.plan.guide.spacings[path])
+        self.table, self.spacing = env.engine.plan.tables[path], float(env.engine.plan.source.spacings[path])
         self.s = self.spacing * np.arange(len(self.table))
         self.length = self.s[-1]
         self.point = CubicHermiteSpline(self.s, self.table[:, :2], self.table[:, 2:4])

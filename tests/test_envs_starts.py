@@ -121,7 +121,7 @@ def test_a_pose_alone_starts_at_the_nearest_place_of_the_path(free):
     """Found by going over the path in steps of 0.1 mm."""
     env = CasterFollowEnv(path="lemniscate", free_heading=free)
     table = env.engine.plan.tables[0]
-    spacing = float(env.engine.plan.guide.spacings[0])
+    spacing = float(env.engine.plan.source.spacings[0])
     arcs = np.arange(len(table)) * spacing
     fine = np.arange(0.0, arcs[-1], 1e-4)
     track = np.stack([np.interp(fine, arcs, table[:, i]) for i in (0, 1)], axis=1)

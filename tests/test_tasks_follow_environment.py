@@ -186,7 +186,7 @@ def test_info_has_the_same_keys_and_types_at_reset_and_step():
 def test_an_episode_lasts_as_long_as_the_law_takes_and_half_of_that():
     """Not a step less or more, whatever the robot has reached by then."""
     env = CasterFollowEnv(path=CIRCLE)
-    table, spacing = env.engine.plan.tables[0], env.engine.plan.guide.spacings[0]
+    table, spacing = env.engine.plan.tables[0], env.engine.plan.source.spacings[0]
     speeds = np.sqrt(table[:, 9])
     duration = np.sum(2.0 * spacing / (speeds[1:] + speeds[:-1]))  # constant accelerations between rows
     steps = int(np.ceil(1.5 * duration / 0.02))

@@ -46,7 +46,7 @@ def test_the_reference_is_the_pose_at_rest(driven):
     for info in (first, last):
         assert_allclose(info["reference_pose"], [POSE] * ROBOTS, rtol=0.0, atol=1e-15)
     assert len(rewards) == 200  # 4 s of 20 ms
-    assert not batch.engine.plan.guide.samples[:, 4:].any()
+    assert not batch.engine.plan.source.samples[:, 4:].any()
 
 
 def test_starts_are_drawn_in_the_area_around_the_pose(driven):

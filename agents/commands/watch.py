@@ -66,7 +66,7 @@ def watch(
     else:
         controller = choose_agent(agent, settings, batch).agent
     end = np.inf if seconds is None else round(seconds / period)
-    longest = np.inf if driving else int(engine.plan.guide.spans[paths, 2].max())
+    longest = np.inf if driving else int(engine.plan.source.spans[paths, 2].max())
     mode = "rgb_array" if save is not None and not driving else "human"
     around = SURROUNDINGS * engine.robot.reach if driving else None
     with ExitStack() as stack:

@@ -93,7 +93,7 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
         **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
         driven=driven,
         failed=failed,
-        allowed=plan.guide.spans[path, 2],
+        allowed=plan.source.spans[path, 2],
         facts={name: values[path] for name, values in plain.definition.facts(plan).items()},
     )
 

@@ -147,7 +147,7 @@ def draw_speeds(
     """Speed along the path in one episode over the way, beside that of the time law."""
     path = index % len(plan.names)
     square = plan.tables[path][:, -1]
-    way = plan.guide.spacings[path] * np.arange(len(square))
+    way = plan.source.spacings[path] * np.arange(len(square))
     axis.plot(way, np.sqrt(square), color="0.6", linewidth=4, label="time law")
     for agent, series in episodes.items():
         progress = series.progress[:, index]

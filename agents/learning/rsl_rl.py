@@ -33,7 +33,7 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
         self.batch, self.cfg = batch, {"seed": seed}
         self.num_envs, self.device = batch.num_envs, batch.device
         (self.num_actions,) = batch.single_action_space.shape
-        self.max_episode_length = int(batch.task.engine.plan.guide.spans[:, 2].max())
+        self.max_episode_length = int(batch.task.engine.plan.source.spans[:, 2].max())
         self._lengths = torch.zeros(self.num_envs, dtype=torch.int64, device=self.device)
         self._seen, _ = batch.reset(seed=seed)
 

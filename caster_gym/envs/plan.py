@@ -43,7 +43,7 @@ class ReferenceSource(Protocol):
 class Plan(NamedTuple):
     """All paths of a task as the compiled step reads them, and what there is to say and to draw of them."""
 
-    guide: Any  # ReferenceSource
+    source: Any  # ReferenceSource
     names: tuple[str, ...]  # of the paths
     tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
     terms: tuple[str, ...]  # names of the reward's terms

@@ -50,7 +50,7 @@ _PLACES: dict[PlaceName, str] = {"progress": "metres along the path", "time": "s
 
 def read_options(options: Any, engine: TaskEngine, *others: str) -> Mapping[str, Any]:
     """The options of a reset of these robots, which may have others beside those of a start."""
-    place: PlaceName | None = engine.plan.guide.place
+    place: PlaceName | None = engine.plan.source.place
     known = (*others, "path", *([place] if place else []), "pose", "twist", "steering")
     here = f"here the place along the path is {place!r}, in {_PLACES[place]}" if place else ""
     return checked_options(options, known, {name: here for name in _PLACES if place and name != place})
@@ -58,7 +58,7 @@ def read_options(options: Any, engine: TaskEngine, *others: str) -> Mapping[str,
 
 def read_start(options: Mapping[str, Any], engine: TaskEngine, chosen: NDArray[np.bool_]) -> Start:
     """The start that options ask for of the chosen ones (robots,). Raises ValueError for what can be no start."""
-    place: PlaceName | None = engine.plan.guide.place
+    place: PlaceName | None = engine.plan.source.place
     meanings: dict[str, tuple[int | None, str]] = {
         **({place: (None, _PLACES[place])} if place else {}),
         "pose": (3, "x, y [m] and heading [rad] in the world frame"),
@@ -119,7 +119,7 @@ def _put(engine: TaskEngine, selected: NDArray[np.int64], wanted: Start) -> None
     if engine.slipping:
         states[:, end:] = rolling(states[:, :end], engine.parameters[selected])
     engine.put(selected, states)
-    if wanted.pose is not None and wanted.place is None and engine.plan.guide.place == "progress":
+    if wanted.pose is not None and wanted.place is None and engine.plan.source.place == "progress":
         _find_place(engine, selected, wanted.pose[:, :2])
 
 
@@ -135,7 +135,7 @@ def rolling(states: Array, parameters: Array) -> Array:
 def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -> None:
     """Move clocks or progress to a place along each robot's path."""
     place = check_place(engine, engine.paths[selected], place)
-    if engine.plan.guide.place == "progress":
+    if engine.plan.source.place == "progress":
         engine.put(selected, progress=place)
     else:
         engine.put(selected, clocks=np.rint(place / engine.control_period).astype(np.int64))
@@ -143,11 +143,11 @@ def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -
 
 def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> Array:
     """Places (robots,) on paths (robots,), in range in spite of rounding. Raises ValueError for ones that are not."""
-    guide: Any = engine.plan.guide
-    name, unit, rows = guide.place, "s", guide.spans[paths, 1] - guide.spans[paths, 0]
+    source: Any = engine.plan.source
+    name, unit, rows = source.place, "s", source.spans[paths, 1] - source.spans[paths, 0]
     most = (rows - 1) * engine.control_period  # at least one control period is left
     if name == "progress":
-        unit, most = "m", rows * guide.spacings[paths]
+        unit, most = "m", rows * source.spacings[paths]
     bad = (place < 0.0) | (place > most * _BY_ROUNDING)
     if bad.any():
         i = int(bad.argmax())
@@ -159,7 +159,7 @@ def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> A
 
 def check_longest(engine: TaskEngine) -> None:
     """Refuse a time on trajectories that episodes are too short for, where clocks start at zero. Raises ValueError."""
-    first, last, longest = engine.plan.guide.spans.T
+    first, last, longest = engine.plan.source.spans.T
     if (longest < last - first).any():
         raise ValueError(
             "options['time'] cannot be given where max_episode_steps ends episodes before their trajectory: leave one "
@@ -198,8 +198,8 @@ def nearest_row(engine: TaskEngine, paths: NDArray[np.int64], points: Array) -> 
     for path in np.unique(paths):
         here = paths == path
         rows[here] = KDTree(engine.plan.tables[path][:, :2]).query(points[here])[1]
-    guide: Any = engine.plan.guide
-    arcs: Array = np.maximum(rows - 1, 0) * guide.spacings[paths]
+    source: Any = engine.plan.source
+    arcs: Array = np.maximum(rows - 1, 0) * source.spacings[paths]
     return arcs
 
 

@@ -63,7 +63,9 @@ class Task:
     lay_out: Callable[
         [Robot, tuple[AnyPath, ...], Any], "tuple[ReferenceSource, list[Way]]"
     ]  # from parameters; its weights are still to be filled in
-    fetch: Callable[..., Any]  # writes what a robot is to do next; see `caster_gym.envs.native.reference.guide_robot`
+    fetch: Callable[
+        ..., Any
+    ]  # writes what a robot is to do next; see `caster_gym.envs.native.reference.fetch_reference`
 
     weights: type[Any]  # type of the reward's numbers: a named tuple whose fields are those of the parameters
     terms: type[Any]  # type of the reward's terms: a named tuple

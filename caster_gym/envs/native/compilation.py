@@ -25,7 +25,7 @@ def of_batch_step(types: tuple[Any, ...]) -> Work:
 
 
 def _words(world: Any, sizes: Any, how: str) -> str:
-    task = code_of(_part(world, "guide")).name
+    task = code_of(_part(world, "source")).name
     around = " among obstacles" if _among_obstacles(world) else ""
     nearest = _count(sizes, "nearest")
     seen = f", {_several(nearest, 'observed obstacle')}" if nearest else ""

@@ -127,9 +127,9 @@ class TaskEngine(Robots):
         """
         world = self._world
         blocks, parameters, clocks, _ = self.changing
-        guide: Any = world.guide.still() if progress_stays else world.guide
+        source: Any = world.source.still() if progress_stays else world.source
         clocks[0] -= 1
-        still = world._replace(blocks=blocks, parameters=parameters, clocks=clocks, guide=guide, substeps=0)
+        still = world._replace(blocks=blocks, parameters=parameters, clocks=clocks, source=source, substeps=0)
         outcome = self._empty()
         still_actions = np.zeros((self.count, len(self.robot.driven)), dtype=np.float32)
         if self.count > 1:
@@ -146,7 +146,7 @@ class TaskEngine(Robots):
 
     def _over(self, late: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whose time is over; an episode that began late may take as long as any, but not past the trajectory's end."""
-        first, last, longest = self.plan.guide.spans[self._world.clocks[1]].T
+        first, last, longest = self.plan.source.spans[self._world.clocks[1]].T
         over: NDArray[np.bool_] = self._world.clocks[0] >= np.minimum(last - first, late + longest)
         return over
 

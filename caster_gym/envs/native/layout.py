@@ -16,7 +16,7 @@ from numba.extending import overload, register_jitable
 from caster_gym.engines.native.compiler import INLINE, borrowed
 from caster_gym.engines.native.guarding import borrowed_floor, borrowed_hull, borrowed_obstacles
 from caster_gym.engines.native.lanes import BODY_ROWS, LANES
-from caster_gym.envs.native.reference import borrowed_guide
+from caster_gym.envs.native.reference import borrowed_source
 from caster_gym.envs.observation import CHANNELS, Channel, Neighbour, observation_size, observe, observed
 from caster_gym.envs.report import RECORD, REPORT_ROWS, Situation
 from caster_gym.envs.tracking import POINT_ROWS, Reference
@@ -32,7 +32,7 @@ class World(NamedTuple):
     clocks: Any  # int64 (2, robots): control periods done, path
     seeds: Any  # uint64 (2, robots): key, episode
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
-    guide: Any  # ReferenceSource of the task
+    source: Any  # ReferenceSource of the task
     hull: Any  # Hull; this and the next two are None where there is no obstacle
     obstacles: Any  # Obstacles
     arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
@@ -183,7 +183,7 @@ def borrowed_world(w: World) -> World:
         borrowed(w.clocks),
         borrowed(w.seeds),
         borrowed(w.slots),
-        borrowed_guide(w.guide),
+        borrowed_source(w.source),
         borrowed_hull(w.hull),
         borrowed_obstacles(w.obstacles),
         _borrowed_arenas(w.arenas),

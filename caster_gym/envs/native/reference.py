@@ -29,7 +29,7 @@ class TaskCode(NamedTuple):
     """What compiled code calls for the robots of a task."""
 
     name: str  # in announcements
-    fetch: Callable[..., Any]  # see `guide_robot`
+    fetch: Callable[..., Any]  # see `fetch_reference`
     weights: Callable[..., Any]  # the named tuple of the reward's numbers, with `corridor` and `touching_ends`
     reward: Callable[..., Any]  # a named tuple of terms from a `Moment` and weights, on generic scalars
     endings: Callable[..., Any]  # `Endings` from the same
@@ -73,22 +73,24 @@ def code_of(source: Any) -> TaskCode:
     return _BY_SOURCE[source.instance_class]
 
 
-def borrowed_guide(guide: Any) -> Any:
+def borrowed_source(source: Any) -> Any:
     """The reference source with its arrays borrowed, in compiled code."""
-    return guide
+    return source
 
 
-def guide_robot(block: Any, lane: Any, row: Any, state: State, clock: Any, path: Any, before: Any, guide: Any) -> Any:
+def fetch_reference(
+    block: Any, lane: Any, row: Any, state: State, clock: Any, path: Any, before: Any, source: Any
+) -> Any:
     """Write reference and previewed points of a robot from a row on; returns its progress [m] and the share of it.
 
     before: progress [m] so far, negative at the start of an episode.
     """
-    return _BY_SOURCE[type(guide)].fetch(block, lane, row, state, clock, path, before, guide)
+    return _BY_SOURCE[type(source)].fetch(block, lane, row, state, clock, path, before, source)
 
 
-def weights_of(guide: Any) -> Any:
+def weights_of(source: Any) -> Any:
     """The weights of the task of a reference source, by name."""
-    return _BY_SOURCE[type(guide)].weights(*guide.weights)
+    return _BY_SOURCE[type(source)].weights(*source.weights)
 
 
 def evaluate(state: Any, reference: Any, torques: Any, record: Any, situation: Any, robot: Any, weights: Any) -> Any:
@@ -134,25 +136,27 @@ def _borrow_arrays(part: Any) -> Any:
     return lambda part: part
 
 
-@overload(borrowed_guide, jit_options=INLINE, strict=False)
-def _borrowed_guide(guide: Any) -> Any:
-    kind = guide.instance_class
-    return lambda guide: kind(*each(_borrowed_part, (), guide[:]))
+@overload(borrowed_source, jit_options=INLINE, strict=False)
+def _borrowed_source(source: Any) -> Any:
+    kind = source.instance_class
+    return lambda source: kind(*each(_borrowed_part, (), source[:]))
 
 
-@overload(guide_robot, jit_options=INLINE, strict=False)
-def _guide_robot(block: Any, lane: Any, row: Any, state: Any, clock: Any, path: Any, before: Any, guide: Any) -> Any:
-    fetch = code_of(guide).fetch
-    return lambda block, lane, row, state, clock, path, before, guide: fetch(
-        block, lane, row, state, clock, path, before, guide
+@overload(fetch_reference, jit_options=INLINE, strict=False)
+def _fetch_reference(
+    block: Any, lane: Any, row: Any, state: Any, clock: Any, path: Any, before: Any, source: Any
+) -> Any:
+    fetch = code_of(source).fetch
+    return lambda block, lane, row, state, clock, path, before, source: fetch(
+        block, lane, row, state, clock, path, before, source
     )
 
 
 @overload(weights_of, jit_options=INLINE, strict=False)
-def _weights_of(guide: Any) -> Any:
-    weights: Any = code_of(guide).weights
+def _weights_of(source: Any) -> Any:
+    weights: Any = code_of(source).weights
     like = (0.0,) * len(weights._fields)
-    return lambda guide: weights(*each(_entry, (guide.weights,), counting(like)))
+    return lambda source: weights(*each(_entry, (source.weights,), counting(like)))
 
 
 @overload(evaluate, jit_options=INLINE, strict=False)

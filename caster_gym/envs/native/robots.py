@@ -75,7 +75,7 @@ class Robots:
             clocks=clocks,
             seeds=seeds,
             slots=np.array([robot.driven.index(j) if j in robot.driven else -1 for j in robot.joints], dtype=np.int64),
-            guide=plan.guide,
+            source=plan.source,
             hull=plan.around.hull if among else None,
             obstacles=plan.around.obstacles if among else None,
             arenas=plan.arenas if among else None,

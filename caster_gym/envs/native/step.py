@@ -24,7 +24,7 @@ from caster_gym.envs.native.layout import (
     copy_rows,
     rows_of,
 )
-from caster_gym.envs.native.reference import evaluate, guide_robot, weights_of
+from caster_gym.envs.native.reference import evaluate, fetch_reference, weights_of
 from caster_gym.envs.observation import GAP_LIMIT, Neighbour, View, observe
 from caster_gym.envs.randomness import uniform
 from caster_gym.envs.report import RECORD, REPORT, RESULT, Record, Situation, flat_report
@@ -73,10 +73,10 @@ def _read_neighbour(workspace: Any, lane: Any, row: Any, index: Any) -> Any:
 
 
 @register_jitable(**INLINE)
-def look(workspace: Any, first: Any, lanes: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
+def look(workspace: Any, first: Any, lanes: Any, source: Any, floor: Any, sizes: Sizes) -> None:
     """Evaluate, observe and report robots whose reference has been fetched, in one loop, which makes it fast."""
     rows = rows_of(sizes)
-    weights = weights_of(guide)
+    weights = weights_of(source)
     for i in range(lanes):
         lane = first + i
         state = state_of(workspace, lane, floor, sizes)
@@ -102,7 +102,7 @@ def fetch(workspace: Any, lane: Any, robot: Any, world: World, sizes: Sizes) -> 
     state = read_state(workspace, lane, 0, sizes.casters)
     clock, path = world.clocks[0, robot], world.clocks[1, robot]
     before = workspace[rows.progress * LANES + lane]
-    progress, share = guide_robot(workspace, lane, rows.reference, state, clock, path, before, world.guide)
+    progress, share = fetch_reference(workspace, lane, rows.reference, state, clock, path, before, world.source)
     workspace[rows.progress * LANES + lane] = progress
     for k in range(len(sizes.nearest)):
         write(workspace, lane, rows.nearest + NEIGHBOUR_ROWS * k, _NOBODY[:])
@@ -150,7 +150,7 @@ def give_results(workspace: Any, here: Any, robot: Any, world: World, views: Vie
         views.results[RESULT.reward, robot + i] = reward
         views.results[RESULT.failed, robot + i] = failed
     for i in range(robot, robot + here):
-        periods = world.guide.spans[world.clocks[1, i], 2]
+        periods = world.source.spans[world.clocks[1, i], 2]
         views.results[RESULT.late, i] = 1.0 if world.clocks[0, i] >= periods else 0.0
 
 
@@ -170,23 +170,23 @@ def _step_lanes(
     for lane in range(here):
         world.clocks[0, first + lane] += 1
         fetch(workspace, lane, first + lane, world, sizes)
-    look_at(workspace, world.guide, world.floor, sizes)
+    look_at(workspace, world.source, world.floor, sizes)
     deliver(workspace, 0, here, first, views, sizes)
     give_results(workspace, here, first, world, views, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_all(workspace: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
-    look(workspace, 0, LANES, guide, floor, sizes)
+def _look_at_all(workspace: Any, source: Any, floor: Any, sizes: Sizes) -> None:
+    look(workspace, 0, LANES, source, floor, sizes)
 
 
 @register_jitable(**INLINE)
-def _look_at_first(workspace: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
-    look_at_one(workspace, np.int64(0), guide, floor, sizes)  # a literal 0 would be compiled anew
+def _look_at_first(workspace: Any, source: Any, floor: Any, sizes: Sizes) -> None:
+    look_at_one(workspace, np.int64(0), source, floor, sizes)  # a literal 0 would be compiled anew
 
 
-def _look_at_one(workspace: Any, lane: Any, guide: Any, floor: Any, sizes: Sizes) -> None:
-    look(workspace, lane, 1, guide, floor, sizes)
+def _look_at_one(workspace: Any, lane: Any, source: Any, floor: Any, sizes: Sizes) -> None:
+    look(workspace, lane, 1, source, floor, sizes)
 
 
 @register_jitable(**INLINE)
@@ -194,8 +194,8 @@ def _take_parameters(block: Any, lane: Any, lanes: Any, workspace: Any, world: W
     """Put the parameters of a block's robots, of all lanes or one, on the workspace."""
     rows = rows_of(sizes)
     shared = len(world.parameters) == 1
-    source = world.parameters[0 if shared else block]
-    copy_rows(source, workspace, lane, lanes, rows.commands - rows.parameters, rows.parameters)
+    parameters = world.parameters[0 if shared else block]
+    copy_rows(parameters, workspace, lane, lanes, rows.commands - rows.parameters, rows.parameters)
 
 
 def _step_block(i: Any, world: World, actions: Any, views: Views, workspace: Any, sizes: Sizes) -> None:
@@ -256,7 +256,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         key, episode = world.seeds[0, robot], world.seeds[1, robot]
         world.seeds[1, robot] = episode + np.uint64(1)
         world.clocks[0, robot] = 0
-        drawn = int(uniform(key, episode, np.uint64(0)) * len(world.guide.spans))
+        drawn = int(uniform(key, episode, np.uint64(0)) * len(world.source.spans))
         world.clocks[1, robot] = drawn if wanted[i] < 0 else wanted[i]
         x = (2.0 * uniform(key, episode, np.uint64(1)) - 1.0) * spread[0]
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
@@ -264,7 +264,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         directions = each(_random_direction, (key, episode), counting(sizes.casters))
         nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions, (), ())
         path = world.clocks[1, robot]
-        guide_robot(workspace, lane, rows.reference, nowhere, 0, path, -1.0, world.guide)
+        fetch_reference(workspace, lane, rows.reference, nowhere, 0, path, -1.0, world.source)
         reference = Reference(*read(workspace, lane, rows.reference, _REFERENCE))
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
         write(workspace, lane, 0, begun(workspace, lane, state, world.floor, sizes))
@@ -275,7 +275,7 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
             workspace[row * LANES + lane] = 0.0
         fetch(workspace, lane, robot, world, sizes)
         copy_rows(workspace, block, lane, 1, rows.parameters, 0)
-        look_at_one(workspace, lane, world.guide, world.floor, sizes)
+        look_at_one(workspace, lane, world.source, world.floor, sizes)
         deliver(workspace, lane, 1, robot, views, sizes)
 
 

@@ -28,7 +28,7 @@ class TorchSource(Protocol):
         ...
 
     def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
-        """What `guide_robot` writes; before (robots,): progress [m] so far, negative at the start of an episode."""
+        """What `fetch_reference` writes; before (robots,): progress [m] so far, negative at the start of an episode."""
         ...
 
 

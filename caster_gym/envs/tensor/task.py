@@ -145,8 +145,8 @@ class TorchTask:
         self.engine, self.task = build_engine(definition, robot, path, actuation, arena, fields or {}, 1, longest)
         self.robot, self.layout, self.diagnostics = self.engine.robot, self.engine.layout, diagnostics
         self.parameters: RobotParameters = robot_parameters(self.robot)
-        self._guide: TorchSource = self._on_tensors(self.engine.plan.guide)
-        numbers = self.engine.plan.guide.weights
+        self._source: TorchSource = self._on_tensors(self.engine.plan.source)
+        numbers = self.engine.plan.source.weights
         self._weights = definition.weights(*torch_weights(numbers, self.dtype, self.device))
         self._reward, self._endings = definition.reward, definition.endings
         self._around = torch_surroundings(self.engine.plan, self.dtype, self.device)
@@ -329,17 +329,17 @@ class TorchTask:
         paths: Tensor,
         before: Tensor,
         robot: RobotParameters,
-        guide: TorchSource | None = None,
+        source: TorchSource | None = None,
     ) -> tuple[TaskOutcome, Tensor, Tensor]:
         """Outcome, progress and room of robots that have moved; before: their progress so far, negative at a start.
 
-        guide: another one than the task's.
+        source: another one than the task's.
         """
         state, n = self._state(bodies), self._joints
         end = n + len(RECORD)
         torques, done, slips = pairs(record[:n].unbind(0)), Record(*record[n:end].unbind(0)), record[end:].unbind(0)
-        guide = self._guide if guide is None else guide
-        guidance = guide.fetch(state, clocks, paths, before)
+        source = self._source if source is None else source
+        guidance = source.fetch(state, clocks, paths, before)
         reference = guidance.reference
         gap, nearest = self._look_around(state, paths)
         situation = Situation(guidance.progress, guidance.share, gap)
@@ -356,7 +356,7 @@ class TorchTask:
         numbers[REPORT.deviation.heading_sin] = torch.atan2(errors.sin, errors.cos)
         rates = all_joint_rates(state, robot, self._floor)
         seen = observe(View(state, reference, errors, guidance.preview, nearest, rates, robot))
-        truncated = clocks >= guide.spans[paths, 2]
+        truncated = clocks >= source.spans[paths, 2]
         rows = torch.stack([number.to(self.dtype) for number in numbers])
         outcome = TaskOutcome(torch.stack(seen).T, sum_of(terms), sum_of(endings) > 0.0, truncated, rows)
         return outcome, guidance.progress, gap
@@ -377,8 +377,8 @@ class TorchTask:
         clocks, before = torch.zeros_like(state.clocks), torch.full_like(state.progress, _BEFORE)
         look = self._look
         if not given.drawn:
-            bodies, clocks, before, guide = self._moved_to(given, bodies, state, paths, checked)
-            look = partial(self._looked, guide=guide)
+            bodies, clocks, before, source = self._moved_to(given, bodies, state, paths, checked)
+            look = partial(self._looked, source=source)
         fresh = TaskState(bodies, before, state.room, clocks, paths, state.keys, state.episodes + 1)
         fresh = self._differentiable(fresh)
         nothing = self._empty(self._record_rows, len(clocks)).requires_grad_(fresh.bodies.requires_grad)
@@ -411,7 +411,7 @@ class TorchTask:
         directions = tuple(self._direction(2.0 * math.pi * uniform(seed, 4 + i)) for i in range(self._joints // 2))
         none = torch.zeros_like(x)
         nowhere = State((none, none), (none, none), (none, none, none), directions)
-        guidance = self._guide.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)
+        guidance = self._source.fetch(nowhere, torch.zeros_like(episodes), paths, none + _BEFORE)
         bodies = torch.stack(pack_state(start(guidance.reference, offset, turn, directions)))
         still = layout.state_rows(self._joints // 2, self._floor is not None) - len(bodies)  # rates of a robot at rest
         return torch.cat((bodies, torch.zeros_like(bodies[:still]))), paths
@@ -430,15 +430,15 @@ class TorchTask:
     def _moved_to(
         self, given: Start, bodies: Tensor, state: TaskState, paths: Tensor, checked: Tensor
     ) -> tuple[Tensor, Tensor, Tensor, TorchSource]:
-        """Drawn bodies where a start is given, with clocks, progress, and a guide under which progress stays.
+        """Drawn bodies where a start is given, with clocks, progress, and a source under which progress stays.
 
         Does what `caster_gym.envs.starts` does with arrays. Raises ValueError for what can be no start.
         """
         engine, rows = self.engine, list(bodies[: BODY_ROWS + self._joints].unbind(0))
         plain, chosen = paths.cpu().numpy(), checked.cpu().numpy()
         clocks, progress = torch.zeros_like(state.clocks), torch.zeros_like(state.progress)
-        guide = engine.plan.guide
-        by_progress, still = guide.place == "progress", self._on_tensors(guide.still())
+        source = engine.plan.source
+        by_progress, still = source.place == "progress", self._on_tensors(source.still())
         if given.place is not None:
             place = given.place.copy()
             place[chosen] = check_place(engine, plain[chosen], place[chosen])
@@ -465,7 +465,7 @@ class TorchTask:
             check_motion(self.robot, np.arctan2(directions[1::2], directions[::2]).T[chosen], given.twist[chosen])
         if by_progress and given.pose is not None and given.place is None:
             before = self._tensor(nearest_row(engine, plain, given.pose[:, :2]))
-            progress = self._guide.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
+            progress = self._source.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
         return self._rolling(torch.stack(rows)), clocks, progress, still
 
     def _tensor(self, numbers: NDArray[np.float64]) -> Tensor:

@@ -85,7 +85,7 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: FollowParamete
 
 def facts(plan: Plan) -> dict[str, NDArray[np.float64]]:
     """Of each path (paths,): goal, the progress with which it is done [m], and law, the time that its law takes [s]."""
-    source = plan.guide
+    source = plan.source
     lengths = (source.spans[:, 1] - source.spans[:, 0]) * source.spacings
     laws = [row_times(table[:, -1], spacing)[-1] for table, spacing in zip(plan.tables, source.spacings, strict=True)]
     return {"goal": lengths - source.arrival, "law": np.array(laws)}
@@ -145,7 +145,7 @@ def _reference_at(path: Any, arc: Any, state: State, source: Courses) -> Referen
 
 
 def fetch(block: Any, lane: Any, row: Any, state: State, _clock: Any, path: Any, before: Any, source: Courses) -> Any:
-    """Write reference and previewed points of a robot where it is on its path; see `guide_robot`."""
+    """Write reference and previewed points of a robot where it is on its path; see `fetch_reference`."""
     length = (source.spans[path, 1] - source.spans[path, 0]) * source.spacings[path]
     progress = 0.0 if before < 0.0 else _nearest(state.position, path, before, source)
     reference = _reference_at(path, progress, state, source)

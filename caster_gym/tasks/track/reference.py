@@ -59,7 +59,7 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: TrackParameter
 
 
 def fetch(block: Any, lane: Any, row: Any, _state: State, clock: Any, path: Any, _before: Any, source: Any) -> Any:
-    """Write reference and previewed points at a robot's clock; see `guide_robot`."""
+    """Write reference and previewed points at a robot's clock; see `fetch_reference`."""
     base, end = source.spans[path, 0], source.spans[path, 1]
     now = min(base + clock, end)
     for j in range(REFERENCE_ROWS):
