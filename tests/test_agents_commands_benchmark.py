@@ -176,10 +176,11 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
         metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
         errors[frequency] = metrics.position_rmse.mean()
     settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
-    _, best = tune(settings, batch)
+    tuned, best = tune(settings, batch)
     frequency = min(errors, key=lambda one: errors[one])
     assert best == settings.model_copy(update={"natural_frequencies": (frequency,)})
-    assert agent.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
+    assert isinstance(tuned, ComputedTorque)
+    assert tuned.gains == ComputedTorque(bare(batch).engine.layout, frequency, bare(batch).task.control_period).gains
 
 
 @pytest.mark.slow
