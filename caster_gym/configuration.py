@@ -51,7 +51,7 @@ class ConfigurationError(ValueError):
     >>> import caster_gym
     >>> caster_gym.load_robot("chung2009")
     Traceback (most recent call last):
-    caster_gym.configuration.ConfigurationError: unknown robot 'chung2009'; known are chung2008, tidybot2, ...
+    caster_gym.configuration.ConfigurationError: unknown robot 'chung2009'; known are ...
     """
 
 

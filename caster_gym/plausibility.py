@@ -5,6 +5,8 @@ Bounds are wide: they let pass what is merely unusual. Nothing is refused, since
 
 import warnings
 from collections.abc import Iterator
+from itertools import combinations
+from math import hypot
 from typing import TYPE_CHECKING, NamedTuple
 
 from caster_gym.configuration import LONGEST_VALUE
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from caster_gym.robot import Caster, Motor, Robot
 
 _GRAVITY = 9.81  # [m/s²]
+_MOST_CASTERS = 16
+_SHOWN = 3  # pairs of casters in a warning
 _STEEL_BALL = 7850.0 * 4.19  # [kg/m³] mass of a steel ball over the cube of its radius
 
 
@@ -33,13 +37,27 @@ def warn_if_implausible(robot: "Robot") -> None:
     for number, caster in enumerate(robot.casters, start=1):
         for doubt in _caster_doubts(caster, robot):
             sentences.setdefault(_sentence(doubt), []).append(str(number))
-    said = [_sentence(doubt) for doubt in _platform_doubts(robot)]
+    said = [*map(_sentence, _platform_doubts(robot)), *_crowding(robot)]
     for sentence, numbers in sentences.items():
         said.append(f"caster{'s' * (len(numbers) > 1)} {', '.join(numbers)}: {sentence}")
     if said:
         name = robot.name if len(robot.name) <= LONGEST_VALUE else f"{robot.name[:LONGEST_VALUE]}…"
         units = "the numbers are in m, kg, kg m², N m and rad/s"
         warnings.warn(f"robot {name!r} can hardly be meant so ({units}): {'; '.join(said)}", RobotWarning, stacklevel=2)
+
+
+def _crowding(robot: "Robot") -> Iterator[str]:
+    """Sentences about more casters than anybody builds, and about casters whose wheels collide when they line up."""
+    if robot.caster_count > _MOST_CASTERS:
+        yield f"it has {robot.caster_count} casters; usual are 3 … 6"
+    close = []
+    for (i, one), (j, other) in combinations(enumerate(robot.casters, start=1), 2):
+        apart, need = hypot(one.x - other.x, one.y - other.y), one.radius + other.radius
+        if apart < need:
+            close.append(f"casters {i} and {j} stand {apart:.2g} m apart, where their wheels need {need:.2g} m in line")
+    yield from close[:_SHOWN]
+    if len(close) > _SHOWN:
+        yield f"so do {len(close) - _SHOWN} more pairs"
 
 
 def _sentence(doubt: _Doubt) -> str:

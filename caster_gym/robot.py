@@ -1,7 +1,7 @@
 """A robot on powered casters: what it is made of, checked, with units. SI throughout; B is the body frame."""
 
+import os
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -13,6 +13,7 @@ from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse,
 from caster_gym.floor import GREATEST
 from caster_gym.outlines import Corners, Outline, convex, polygon_fault
 from caster_gym.plausibility import warn_if_implausible
+from caster_gym.shipped_files import find, names_of, own_file
 
 
 class Motor(Frozen):
@@ -293,11 +294,16 @@ def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
         return name
     if isinstance(name, Mapping):
         return parse(Robot, name, "the robot")
+    if not isinstance(name, str | os.PathLike):
+        raise ConfigurationError(
+            f"a robot is a name, the path of a YAML file, a mapping with its content, or a Robot, got {name!r}"
+        )
     path = Path(name).expanduser()
-    if not is_yaml(path):
-        folder = Path(str(files("caster_gym.configs"))) / "robots"
-        path = folder / f"{name}.yaml"
-        if not path.is_file():
-            known = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
-            raise ConfigurationError(f"unknown robot {str(name)!r}; known are {known}, or give the path of a YAML file")
+    if not is_yaml(path) and str(name) not in names_of("robots"):
+        own = own_file(str(name))
+        known = f"known are {', '.join(names_of('robots'))}, or give the path of a YAML file"
+        if path.is_dir():
+            raise ConfigurationError(f"{str(name)!r} is a folder, not a robot; {known}")
+        raise ConfigurationError(f"unknown robot {str(name)!r}; {f'did you mean the file {own!r}?' if own else known}")
+    path = find("robots", path)
     return parse(Robot, read_yaml(path), str(path))

@@ -5,12 +5,15 @@ from typer.testing import CliRunner
 
 from caster_gym.agents.commands.cli import app
 from caster_gym.agents.commands.warm import Piece, read_pieces, warm
+from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.configuration import ConfigurationError
 from caster_gym.engines.native import compiled_files
 from caster_gym.engines.native.compilation import Work
 from caster_gym.engines.native.compiler import compiled
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.envs.native.engine import TaskEngine
+from caster_gym.robot import load_robot
+from caster_gym.shipped_files import names_of, read_settings
 
 
 @pytest.fixture(autouse=True)
@@ -18,17 +21,22 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled_files._SETTINGS, "CACHE_DIR", str(tmp_path / "cache"))
 
 
+TASKS = [read_settings(TaskSettings, "tasks", name) for name in names_of("tasks")]
+KINDS = {task.environment for task in TASKS if task.task.slippery is None}
+
+
 def names(*arguments):
     return [piece.name for piece in read_pieces(*arguments)]
 
 
 def test_what_comes_with_the_package_is_compiled_unless_something_is_named():
-    """Robots with 3 and 4 casters, both tasks: each alone and in batches, with and without obstacles; the mechanics."""
+    """Each number of casters, each kind of task: alone and in batches, with and without obstacles; the mechanics."""
     pieces = names([], [], [])
-    assert len(set(pieces)) == len(pieces) == 2 * (2 * 2 * 2 + 2)
-    assert {name.split(",")[0] for name in pieces} == {"3 casters", "4 casters"}
+    counts = {load_robot(name).caster_count for name in names_of("robots")}
+    assert len(set(pieces)) == len(pieces) == len(counts) * (len(KINDS) * 2 * 2 + 2)
+    assert {name.split(",")[0] for name in pieces} == {f"{count} casters" for count in counts}
     assert names(["tidybot2"], ["track"], []) == [
-        name for name in pieces if name.startswith("4") and "follow" not in name
+        name for name in pieces if name.startswith("4 casters, track") or name.startswith("4 casters, mechanics")
     ]
 
 
@@ -52,7 +60,7 @@ def test_a_robot_with_any_number_of_casters_can_be_made(casters, monkeypatch):
         monkeypatch.setattr(kind, name, lambda self, *_: steps.append(self))
     for piece in read_pieces([], [], [casters]):
         piece.run()
-    assert len(steps) == 8 * 2 + 2
+    assert len(steps) == len(KINDS) * 2 * 2 * 2 + 2  # a restart and a step of each piece
 
 
 def test_a_robot_that_is_not_there():

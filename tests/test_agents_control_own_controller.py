@@ -80,7 +80,7 @@ def test_actions_may_be_whatever_holds_the_numbers(actions):
         (3, "controller must return an object with a method act, got 3"),
         (object(), "controller must return an object with a method act, got <object"),
         (Springs, "controller must return an object, got the class Springs itself: call it"),
-        (Nameless(), "controller must return an object with a name for tables and figures, .* got None as the name of"),
+        (Nameless(), "controller must return an object whose name, .*, is a text, got None as the name of"),
         (fail, r"controller: ValueError: too stiff \(.*test_agents_control_own_controller\.py, line \d+\)"),
     ],
 )

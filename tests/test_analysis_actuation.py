@@ -7,6 +7,7 @@ import pytest
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.analysis.actuation import SINGULAR, ActuationWarning, warn_if_singular, worst_conditioning
+from caster_gym.shipped_files import names_of
 
 CHUNG = load_robot("chung2008")
 BOTH_JOINTS_OF_TWO = [("roll_1", "steer_1", "roll_2", "steer_2")] + [
@@ -68,7 +69,7 @@ def test_two_whole_wheels_are_singular_once_their_centres_can_coincide(joints):
     np.testing.assert_allclose(centres[0], centres[1], atol=1e-5)  # [m] as far as the search goes
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_worst_is_below_every_point_of_a_grid_and_attained(name):
     robot = load_robot(name)
     value, steering = worst_conditioning(robot)
@@ -79,7 +80,7 @@ def test_worst_is_below_every_point_of_a_grid_and_attained(name):
     assert all(-np.pi < angle <= np.pi for angle in steering)
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_all_joints_driven_always_push(name, recwarn):
     robot = load_robot(name)
     assert robot.actuation == "all"

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.tipping import LiftWarning, least_load, warn_if_lifting
+from caster_gym.shipped_files import names_of
 from caster_gym.tasks.track.environment import CasterTrackEnv
 
 
@@ -48,7 +49,7 @@ def test_a_robot_that_lifts_is_warned_of_and_shipped_ones_are_not():
         CasterTrackEnv(standing("xr4000", 0.35))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for name in ("chung2008", "tidybot2", "xr4000"):
+        for name in names_of("robots"):
             warn_if_lifting(load_robot(name))
 
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from caster_gym import Robot, load_robot
 from caster_gym.design.isotropy import _entering, _grids, global_isotropies
 from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.shipped_files import names_of
 from papers.analysis.isotropy import isotropy
 from papers.notation import kim2001_robot
 from tests.random_robots import random_robot
@@ -74,7 +75,7 @@ def test_mirrors_of_the_triangle_save_work():
     assert counts == {1: [4, 6, 6], 2: [6, 6, 7], 3: [4, 12, 12], 4: [12, 6]}
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_shipped_robots_agree_with_brute_force(name):
     """Offsets, four casters, and a triangle that is nearly equilateral."""
     robot = load_robot(name)

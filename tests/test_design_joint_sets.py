@@ -10,6 +10,7 @@ import pytest
 
 from caster_gym import Model, Robot, load_robot
 from caster_gym.design.joint_sets import classify, turned_parallel, turned_towards
+from caster_gym.shipped_files import names_of
 from papers.analysis.action_lines import action_lines, meeting, smallest_singular_value
 from papers.analysis.joint_sets import (
     classify_all,
@@ -58,7 +59,7 @@ def searched(robot: Robot, joints, seed: int) -> float:
     return float(values(best).min())
 
 
-@pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_with_short_trails_two_casters_with_both_joints_decide(name):
     """kim2001, III, for every set and for four casters as well: three joints and more, never singular or somewhere."""
     sets = classify_all(load_robot(name))

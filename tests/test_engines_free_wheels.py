@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from caster_gym import load_robot
 from caster_gym.engines.free_wheels import check_free_wheels, free_rates
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
+from caster_gym.shipped_files import names_of
 from tests.random_robots import random_robot
 
 
@@ -48,7 +49,7 @@ def test_rates_are_those_of_the_eigenvalues():
             assert_allclose(free_rates(rows(robot))[0, i], max(rates), rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_the_tasks_steps_follow_the_robots_that_come_with_the_package(name):
     check_free_wheels(name, rows(load_robot(name)), 0.01, 2)
 

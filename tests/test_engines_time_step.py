@@ -23,11 +23,12 @@ from caster_gym.mechanics.dynamics import kinetic_energy
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters, unpack_parameters
 from caster_gym.mechanics.plant import driven_step
+from caster_gym.shipped_files import names_of
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import Friction, Payload, WheelErrors, wrap
 from tests.random_robots import random_robot
 
-ROBOTS = ("chung2008", "tidybot2", "xr4000")
+ROBOTS = names_of("robots")
 PATH = {"shape": "circle", "radius": 0.5, "duration": 2000.0}  # so slow that robots full of friction can follow
 pytestmark = pytest.mark.filterwarnings("ignore::caster_gym.plausibility.RobotWarning")
 

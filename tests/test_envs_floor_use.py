@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
 from caster_gym.mechanics.parameters import GRAVITY
+from caster_gym.shipped_files import names_of
 from caster_gym.tasks.track.environment import CasterTrackEnv
 from tests.kane import Kane
 from tests.random_robots import random_robot
@@ -95,7 +96,7 @@ def stepped(robot, state, joints, wrench, h):
     return state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_a_push_on_a_robot_at_rest_is_held_by_the_floor(name):
     """A push of 0.6 of the weight and no torque: the floor gives what the accelerated bodies do not take."""
     robot = load_robot(name)

@@ -12,17 +12,18 @@ from typer.testing import CliRunner
 from caster_gym import Model, load_robot
 from caster_gym.agents.commands.cli import app
 from caster_gym.export.mjcf import mjcf
+from caster_gym.shipped_files import names_of
 from tests.random_robots import random_robot
 
 STEP = 2e-3  # [s]
-ROBOTS = ("chung2008", "tidybot2", "xr4000")
+ROBOTS = names_of("robots")
 
 
 def compiled(robot, **options):
     return mujoco.MjModel.from_xml_string(mjcf(robot, STEP, **options))
 
 
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_masses_are_those_of_the_robot(name):
     robot = load_robot(name)
     total = robot.platform.mass + sum(caster.wheel.mass + caster.link.mass for caster in robot.casters)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from caster_gym import Model, load_robot
+from caster_gym.shipped_files import names_of
 from scripts.impact_peer import (
     FRONT,
     RESTITUTION,
@@ -23,7 +24,7 @@ GRIP = 1e3  # friction of a floor on which nothing slips
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_on_a_floor_that_holds_mujocos_impulse_is_ours(name):
     """The wheels' inertia answers as the equations say; MuJoCo lets casters turn during its contact, by up to 20°."""
     robot = load_robot(name)

@@ -14,6 +14,7 @@ from caster_gym import Model, Robot, load_robot
 from caster_gym.mechanics.contact_impulses import STILL, Pressure, press
 from caster_gym.mechanics.dynamics import inertia
 from caster_gym.mechanics.integration import State
+from caster_gym.shipped_files import names_of
 from tests.random_robots import CASTER_COUNTS, random_robot
 from tests.walks import FLOOR, NEEDLE, TRIANGLE, Walk, around_it, corners_of, energy, floats, shaped, state_of
 
@@ -287,7 +288,7 @@ def test_rough_contacts_that_do_not_bounce_obey_coulombs_law():
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, 2.0])
-@pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_a_flush_side_that_does_not_bounce_leaves_nothing_along_the_normal(name, mu):
     """One end at least rests, both where the robot is not heavier on one side of the wall's normal."""
     robot = load_robot(name)

@@ -22,6 +22,7 @@ from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.parameters import GRAVITY, robot_parameters
 from caster_gym.mechanics.scalars import pairs
 from caster_gym.mechanics.slip_state import rolling_state
+from caster_gym.shipped_files import names_of
 from tests.random_robots import CASTER_COUNTS, random_robot
 
 ROUNDS = (1.0, 1.0, 1.0, 0.5, 0.5, 0.25, *(0.0,) * 10)  # more than enough
@@ -139,7 +140,7 @@ def test_stiffness_is_the_derivative_of_the_impulse():
         )  # h² and rounding / h
 
 
-ROBOTS = [load_robot(name) for name in ("chung2008", "xr4000", "tidybot2")]
+ROBOTS = [load_robot(name) for name in names_of("robots")]
 ROBOTS += [random_robot(seed, count) for seed in range(2) for count in CASTER_COUNTS]
 
 

@@ -10,6 +10,7 @@ from caster_gym.mechanics.integration import rk4_step
 from caster_gym.mechanics.motors import joint_torques, motor_ranges, motor_speeds, motor_torques, torque_range
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.plant import driven_step
+from caster_gym.shipped_files import names_of
 from tests.random_robots import random_robot
 from tests.walks import floats, state_of, steering_of
 
@@ -89,7 +90,7 @@ def test_passive_motors_give_no_torque(driven):
             assert low <= torque <= high
 
 
-@pytest.mark.parametrize("name", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("name", names_of("robots"))
 def test_power_is_the_mean_of_torque_times_speed(name):
     """(M2): against eighty fine steps under the same torques; off by the second order of the time step."""
     robot = load_robot(name)

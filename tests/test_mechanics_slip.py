@@ -15,12 +15,13 @@ from caster_gym.mechanics.scalars import each, pairs, total
 from caster_gym.mechanics.slip import slip_step
 from caster_gym.mechanics.slip_state import rolling_state, turn_by, unpack_slip_state
 from caster_gym.mechanics.slip_tilt import free_tilt
+from caster_gym.shipped_files import names_of
 from tests.free_motion import slip_dynamics
 from tests.kane_free import FreeKane
 from tests.random_robots import CASTER_COUNTS, frictionless, random_motion, random_robot
 
 NOTHING = (0.0, 0.0, 0.0)
-ROBOTS = ("chung2008", "xr4000", "tidybot2")
+ROBOTS = names_of("robots")
 
 
 def directions(steering):

@@ -16,10 +16,11 @@ from caster_gym.mechanics.ground import wheel_loads
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.separation import Hull, Obstacles
 from caster_gym.mechanics.slip_state import rolling_state
+from caster_gym.shipped_files import names_of
 from tests.free_motion import slip_dynamics
 from tests.kane_free import FreeKane
 
-ROBOTS = ("chung2008", "xr4000", "tidybot2")
+ROBOTS = names_of("robots")
 NOTHING = (0.0, 0.0, 0.0)
 
 

@@ -15,6 +15,7 @@ from caster_gym.paths.moments import sample_paths
 from caster_gym.paths.trailing import trailing_directions
 from caster_gym.paths.trajectory import COLUMNS, Trajectory
 from caster_gym.robot import Robot
+from caster_gym.shipped_files import names_of
 
 ROBOT = load_robot("chung2008")
 DEFAULTS = ("circle", "ellipse", "lemniscate", "rounded_square", "random_paths")
@@ -77,7 +78,7 @@ def test_use_is_that_of_the_least_torques_that_give_the_model_its_wrench(path):
         assert found.speed[k] == pytest.approx(speed[moment, joint], rel=5e-3, abs=1e-9)
 
 
-ROBOTS = ("chung2008", "tidybot2", "xr4000")
+ROBOTS = names_of("robots")
 WAYPOINTS = ((0.0, 0.0), (0.6, 0.3), (0.9, 1.0), (0.3, 1.4), (-0.5, 0.9), (-0.4, 0.1))
 SPOTS = ((0, 0, 0), (1, 0, 0), (1, 0, 1.5), (1, 1, 1.5), (1, 1, 3.0), (0, 1, 3.0))
 LOG = [(0.05 * k, round(np.cos(0.045 * k), 3), round(np.sin(0.065 * k), 3), round(0.025 * k, 3)) for k in range(120)]

@@ -5,12 +5,14 @@ import warnings
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from caster_gym import Robot, load_robot
 from caster_gym.configuration import read_yaml
 from caster_gym.plausibility import RobotWarning
+from caster_gym.shipped_files import names_of
 from tests.random_robots import CASTER_COUNTS, random_robot
 
 FOLDER = Path(str(files("caster_gym.configs"))) / "robots"
@@ -112,10 +114,37 @@ def test_only_the_number_in_question_is_told():
     assert "x, y" not in str(told[0].message)
 
 
+def ring(count, radius):
+    """A robot whose casters, alike, stand around C."""
+    robot = content()
+    around = radius * np.exp(2j * np.pi * np.arange(count) / count)
+    robot["casters"] = [{**robot["casters"][0], "x": z.real.item(), "y": z.imag.item()} for z in around]
+    return robot
+
+
+def test_casters_whose_wheels_collide_are_told():
+    """Two whose pivots coincide; the wheels of a ring meet when neighbours stand closer than two radii."""
+    same = content()
+    same["casters"][1] |= {key: same["casters"][0][key] for key in ("x", "y")}
+    radius = same["casters"][0]["radius"]
+    with pytest.warns(RobotWarning, match=f"casters 1 and 2 stand 0 m apart, .* need {2.0 * radius:.2g} m in line"):
+        Robot.model_validate(same)
+    for share, crowded in ((0.99, True), (1.01, False)):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", RobotWarning)
+            Robot.model_validate(ring(6, share * 2.0 * radius))  # neighbours are as far apart as from C
+        assert ("casters 1 and 2 stand" in "".join(str(one.message) for one in told)) is crowded
+
+
+def test_hosts_of_casters_are_told():
+    with pytest.warns(RobotWarning, match=r"it has 150 casters; usual are 3 … 6; casters 1 and 2 .*; so do \d+ more"):
+        Robot.model_validate(ring(150, 0.2))
+
+
 def test_robots_in_use_are_not_doubted():
     with warnings.catch_warnings():
         warnings.simplefilter("error", RobotWarning)
-        for name in ("chung2008", "tidybot2", "xr4000"):
+        for name in names_of("robots"):
             robot = load_robot(name)
             assert robot.with_actuation("all").without_wheels()
             assert Robot.model_validate(read_yaml(FOLDER / f"{name}.yaml")) == robot

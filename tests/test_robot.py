@@ -9,8 +9,9 @@ import yaml
 from caster_gym import Model, Robot, load_robot
 from caster_gym.configuration import ConfigurationError
 from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.shipped_files import names_of
 
-ROBOTS = ("chung2008", "tidybot2", "xr4000")
+ROBOTS = names_of("robots")
 CASTER = {
     "x": 0.2,
     "y": 0.0,
@@ -143,8 +144,23 @@ def test_a_robot_may_be_a_mapping_or_a_file_with_an_upper_case_suffix(tmp_path):
 
 
 def test_unknown_name_is_answered_with_the_known_ones():
-    with pytest.raises(ConfigurationError, match=r"unknown robot 'tidybot3'; known are .*chung2008.*tidybot2.*xr4000"):
+    known = ", ".join(ROBOTS)
+    with pytest.raises(ConfigurationError, match=rf"unknown robot 'tidybot3'; known are {known}, or give the path"):
         load_robot("tidybot3")
+
+
+@pytest.mark.parametrize("nothing", [None, 3, b"chung2008", ["chung2008"]])
+def test_what_names_no_robot_is_refused(nothing):
+    with pytest.raises(ConfigurationError, match=r"a robot is a name, the path of a YAML file, .* got "):
+        load_robot(nothing)
+
+
+def test_a_folder_or_a_name_without_its_suffix_gets_a_hint(tmp_path):
+    with pytest.raises(ConfigurationError, match=rf"'{tmp_path}' is a folder, not a robot; known are "):
+        load_robot(tmp_path)
+    (tmp_path / "mine.yaml").touch()
+    with pytest.raises(ConfigurationError, match=r"unknown robot '.*mine'; did you mean the file '.*mine\.yaml'\?"):
+        load_robot(tmp_path / "mine")
 
 
 def test_missing_file_is_named():

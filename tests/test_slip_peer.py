@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from caster_gym import load_robot
+from caster_gym.shipped_files import names_of
 from scripts.slip_peer import (
     OUR_STEPS,
     STEPS,
@@ -28,7 +29,7 @@ def scene_of(robot, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("robot", names_of("robots"))
 @pytest.mark.parametrize(
     ("name", "tolerance"),
     [
@@ -46,7 +47,7 @@ def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["chung2008", "xr4000", "tidybot2"])
+@pytest.mark.parametrize("robot", names_of("robots"))
 def test_drifts_end_where_mujocos_do(robot):
     """A way of some dm, on which wheels slide at up to 2 m/s: MuJoCo's contacts hop then."""
     scene = scene_of(robot, "drift")

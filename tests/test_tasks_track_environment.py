@@ -14,6 +14,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 from caster_gym import Model, load_robot
 from caster_gym.analysis.actuation import ActuationWarning
 from caster_gym.envs.observation import observation_size
+from caster_gym.shipped_files import names_of
 from caster_gym.tasks.building import build_engine
 from caster_gym.tasks.track import TASK
 from caster_gym.tasks.track.environment import CasterTrackEnv
@@ -43,7 +44,7 @@ def flat(value):
     return np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()
 
 
-@pytest.mark.parametrize("robot", ["chung2008", "tidybot2", "xr4000"])
+@pytest.mark.parametrize("robot", names_of("robots"))
 def test_gymnasium_and_sb3_find_nothing_to_complain_about(robot):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -285,7 +286,7 @@ def test_max_episode_steps_of_make_truncates():
     ("arguments", "message"),
     [
         ({"coridor": 1.0}, "'coridor'.*did you mean 'corridor'"),
-        ({"robot": "chung2009"}, "unknown robot 'chung2009'; known are chung2008"),
+        ({"robot": "chung2009"}, "unknown robot 'chung2009'; known are "),
         ({"path": "circel"}, "'circel'; did you mean 'circle'"),
         ({"actuation": ["roll_9"]}, "unknown joint 'roll_9'; the joints are roll_1"),
         ({"actuation": []}, "at least one joint must be named"),

@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from caster_gym import Model, load_robot
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import ConfigurationError
+from caster_gym.shipped_files import names_of
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import JointSpeeds, ResidualTorque, SensorNoise, TwistCommands, read_features, wrap
 
 PATH = {"shape": "circle", "radius": 0.5}
-ROBOTS = ("chung2008", "tidybot2", "xr4000")
+ROBOTS = names_of("robots")
 PERIOD = 0.02  # [s] of the environment's control
 
 

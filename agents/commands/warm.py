@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from caster_gym.engines.native.compilation import compilations, included
 from caster_gym.engines.native.compiled_files import roots, version
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.robot import Robot, load_robot
-from caster_gym.shipped_files import read_settings
+from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.building import build_engine
 from caster_gym.tasks.registry import find_task
 
@@ -42,9 +41,9 @@ def read_pieces(robots: Sequence[str], tasks: Sequence[str], casters: Sequence[i
     Of these, tasks on a floor of finite friction, which take twice as long, only if they are named.
     Raises ValueError for a robot or a task that is not there or wrong, and for fewer than two casters.
     """
-    known = [read_settings(TaskSettings, "tasks", name) for name in tasks or _shipped("tasks")]
+    known = [read_settings(TaskSettings, "tasks", name) for name in tasks or names_of("tasks")]
     chosen = [one for one in known if tasks or one.task.slippery is None]
-    named = [*robots] if robots or casters else [*_shipped("robots"), *(task.robot for task in chosen)]
+    named = [*robots] if robots or casters else [*names_of("robots"), *(task.robot for task in chosen)]
     by_casters = {robot.caster_count: robot for robot in map(load_robot, named)}
     for count in casters:
         if count < 2:
@@ -72,10 +71,6 @@ def warm(pieces: Sequence[Piece], report: Callable[[int, str], None]) -> Warmed:
         compiled += compilations() > before
     report(len(pieces), "")
     return Warmed(len(pieces), compiled, str(next(roots()) / version()))
-
-
-def _shipped(kind: str) -> list[str]:
-    return sorted(file.name.removesuffix(".yaml") for file in (files("caster_gym.configs") / kind).iterdir())
 
 
 def _of_task(robot: Robot, task: ChosenTask) -> list[Piece]:

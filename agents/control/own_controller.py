@@ -41,8 +41,8 @@ def controller_of(settings: ControllerSettings, layout: ObservationLayout, perio
         name = getattr(controller, "name", None)
     if not isinstance(name, str) or not name.strip():
         raise OwnCodeError(
-            f"{words} must return an object with a name for tables and figures, such as name = 'spring', got {name!r} "
-            f"as the name of {controller!r}"
+            f"{words} must return an object whose name, for tables and figures, is a text, got {name!r} as the name of "
+            f"{controller!r}"
         )
     return _Checked(controller, name, agent, layout)
 
