@@ -161,7 +161,7 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             writer.writerow(_FIELDS)
-        for law, number in tqdm(missing, desc="recordings", file=sys.stderr):
+        for law, number in tqdm(missing, desc="recordings", file=sys.stderr, disable=None):
             if law not in made:
                 made[law] = recordings(LAWS[law], counts[law], list(LAWS).index(law))
             writer.writerows(fitted(made[law][number], law, number))

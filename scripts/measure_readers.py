@@ -71,7 +71,7 @@ def main() -> None:
         files = [folder / "single.xml", folder / "coupled.xml"]
         for file, robot in zip(files, (single(), load_robot("tidybot2")), strict=True):
             file.write_text(mjcf(robot, STEP), encoding="utf-8")
-        answers = {reader: ask(reader, folder, files) for reader in tqdm(READERS, unit="reader")}
+        answers = {reader: ask(reader, folder, files) for reader in tqdm(READERS, unit="reader", disable=None)}
     arguments.out.write_text(between_marks(page, BEGIN, END, f"\n{table(answers)}\n"), encoding="utf-8")
 
 

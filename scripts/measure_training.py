@@ -192,7 +192,10 @@ def learning(learner: BaseAlgorithm, periods: int) -> Callable[[], float]:
 def train_timed(name: str, task: TaskSettings, settings: LearnerSettings, seed: int) -> Course:
     """Train to the end of the settings, as in a process of its own: what Torch has compiled it gets from the disk."""
     torch.compiler.reset()
-    with tempfile.TemporaryDirectory() as folder, tqdm(total=settings.n_timesteps, desc=f"{name}, seed {seed}") as bar:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        tqdm(total=settings.n_timesteps, desc=f"{name}, seed {seed}", disable=None) as bar,
+    ):
         timed = TimedRun(Path(folder), task, settings, seed, bar)
         settings.learn(timed)
         timed.logger.close()

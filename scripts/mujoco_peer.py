@@ -224,7 +224,7 @@ def main(arguments: list[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     robots = [without_dry_friction(load_robot(name)) for name in chosen.robots]
     pairs = [(robot, drive) for robot in robots for drive in strong_drives(robot, chosen.draws)]
-    comparisons = [compare(robot, drive) for robot, drive in tqdm(pairs, file=sys.stderr)]
+    comparisons = [compare(robot, drive) for robot, drive in tqdm(pairs, file=sys.stderr, disable=None)]
     creeps = [creep(robot) for robot in map(load_robot, chosen.robots) if robot.casters[0].roll.coulomb > 0.0]
     chosen.out.mkdir(parents=True, exist_ok=True)
     write_table(chosen.out / "convergence.csv", comparisons)

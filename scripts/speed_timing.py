@@ -88,7 +88,7 @@ def run(rows: Sequence[Row], turns: int) -> dict[str, list[float]]:
     if len(measured) < len(rows):
         raise ValueError("two rows have the same key")
     rng = np.random.default_rng(0)
-    with tqdm(total=sum(min(turns, row.turns or turns) for row in rows), file=sys.stderr) as progress:
+    with tqdm(total=sum(min(turns, row.turns or turns) for row in rows), file=sys.stderr, disable=None) as progress:
         for turn in range(turns):
             for i in rng.permutation(len(rows)):
                 if turn < (rows[i].turns or turns):

@@ -59,7 +59,7 @@ def train_beside(learner: BaseAlgorithm, periods: int, pairs: int = PAIRS) -> Be
     learner.learn(periods)  # compiles, and is not counted
     rounds: list[Round] = []
     rng, processes = np.random.default_rng(0), max(1, usable_cores() - 1)
-    with busy_processes(processes), tqdm(total=pairs * len(COUNTS), desc="beside busy processes") as bar:
+    with busy_processes(processes), tqdm(total=pairs * len(COUNTS), desc="beside busy processes", disable=None) as bar:
         for _ in range(pairs):
             for threads in rng.permutation(COUNTS).tolist():
                 with limit_threads(threads):

@@ -4,6 +4,7 @@ import csv
 import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError
+from caster_gym.own_errors import OwnCodeError
 from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.follow.metrics import FollowMetrics, FollowVerdict
 from caster_gym.tasks.track.metrics import TrackMetrics, TrackVerdict, measure
@@ -270,6 +272,41 @@ def test_computed_torque_is_refused_where_actions_are_no_torques(task):
     settings = ComputedTorqueSettings(algorithm="computed torque")
     with pytest.raises(ValueError, match=r"computed torque gives torques, but .* of \{kind: twist_commands\}: leave"):
         tune(settings, evaluation_batch(commanded, commanded.validation, starts=1))
+
+
+class Silent:
+    """Acts once or never; says how often it was asked."""
+
+    name = "silent"
+    asked = 0
+
+    def __init__(self, actions: Any) -> None:
+        self.actions = actions
+
+    def act(self, observations):
+        self.asked += 1
+        return self.actions
+
+
+@pytest.mark.parametrize("actions", [None, np.zeros((PATHS, 6), dtype=np.float32)])
+def test_a_controller_of_ones_own_is_tried_before_anything_is_trained(task, actions):
+    """And the one that takes part has seen nothing before its first episode."""
+    made = []
+
+    class Own(ControllerSettings):
+        def controller(self, layout, period):
+            made.append(Silent(actions))
+            return made[-1]
+
+    settings, batch = Own(algorithm="mine:Own"), evaluation_batch(task, task.validation, starts=1)
+    if actions is None:
+        with pytest.raises(
+            OwnCodeError, match=r"agent 'lazy' \(mine:Own\): its method act must return actions of shape"
+        ):
+            tune(settings, batch, "lazy")
+    else:
+        assert tune(settings, batch, "lazy").settings == settings
+    assert [one.asked for one in made] == [0, 1]
 
 
 @pytest.mark.parametrize("name", names_of("benchmarks"))

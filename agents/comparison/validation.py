@@ -54,7 +54,11 @@ def tune(settings: ControllerSettings, validation: Batch, called: str | None = N
     layout, period = plain.engine.layout, plain.task.control_period
     called = called or settings.algorithm
     tried = [Tuned(controller_of(one, layout, period, called), one) for one in candidates_of(settings, called)]
-    return max(tried, key=lambda one: verdict_on(one.controller, validation).merit) if len(tried) > 1 else tried[0]
+    if len(tried) > 1:
+        return max(tried, key=lambda one: verdict_on(one.controller, validation).merit)
+    if settings.is_own:  # another one acts once, so that mistakes show before anything is trained
+        controller_of(tried[0].settings, layout, period, called).act(validation.reset(seed=VALIDATION_SEED)[0])
+    return tried[0]
 
 
 def write_history(path: Path, history: Sequence[Validation]) -> None:
