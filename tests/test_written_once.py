@@ -14,11 +14,11 @@ _DRAWS = "starts drawn from uniform numbers"
 ARITHMETIC = {
     "_described": "seconds that compiling takes",
     "check_memory": "bytes",
-    "_moved": "rows of tensors for `integration.runge_kutta`; " + _SHARES,
+    "_moved": "rows of tensors for `integration.runge_kutta`",
     "surface_below": "times 0, for a tensor of the precision of the states",
-    **dict.fromkeys(("__init__", "scene", "_moved_to"), _TIMES),
-    **dict.fromkeys(("drive", "_scaled", "_counted", "careful_step", "step"), _SHARES),
-    **dict.fromkeys(("_random_direction", "_restart", "_placed", "_displacement"), _DRAWS),
+    **dict.fromkeys(("__init__", "scene", "move_to"), _TIMES),
+    **dict.fromkeys(("drive", "_scaled", "_counted", "careful_step", "move"), _SHARES),
+    **dict.fromkeys(("_random_direction", "_restart", "place", "_displacement"), _DRAWS),
     "_observe": "counts of channels, and their units",
 }
 

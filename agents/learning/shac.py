@@ -21,7 +21,8 @@ from caster_gym.agents.learning.settings import SHACSettings, scheduled
 from caster_gym.agents.learning.tensors import check_compiler, torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.engines.time_step import longest_time_step, substeps_for
-from caster_gym.envs.tensor.task import TaskOutcome, TorchTask
+from caster_gym.envs.tensor.state import TaskOutcome
+from caster_gym.envs.tensor.task import TorchTask
 
 MOMENTA = (0.7, 0.95)  # of the policy's Adam, as the paper has them: gradients through a simulator scatter little
 

@@ -50,6 +50,12 @@ def torch_floor(floor: Floor) -> FloorTable:
     return table._replace(patches=None if table.patches is None else table.patches.tolist())
 
 
+def state_of(bodies: Tensor, floor: FloorTable | None) -> State:
+    """The state whose rows these are (rows, robots); on a floor of finite friction each caster has rates of its own."""
+    rows = bodies.unbind(0)
+    return unpack_state(rows) if floor is None else unpack_slip_state(rows)
+
+
 def surface_below(state: State, robot: RobotParameters, floor: FloorTable) -> Surface:
     """The floor under each robot, whose frictions are tensors (robots,)."""
     friction = robot.platform.floor_friction + 0.0 * state.position[0]  # Torch chooses between numbers in float32

@@ -14,27 +14,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils import _pytree as pytree
 
-from caster_gym.engines.tensor.motion import surface_below
+from caster_gym.engines.tensor.motion import state_of, surface_below
 from caster_gym.envs.observation import GAP_LIMIT, Neighbour
 from caster_gym.envs.plan import Plan
-from caster_gym.envs.report import RECORD, Record, record_of
+from caster_gym.envs.report import Record, record_of
+from caster_gym.envs.tensor.state import Given, record_parts
 from caster_gym.mechanics.floor import FloorTable
-from caster_gym.mechanics.integration import State, pack_state, unpack_state
-from caster_gym.mechanics.parameters import RobotParameters
+from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import guarded_driven_step, slip_speeds
 from caster_gym.mechanics.scalars import each, flatten, pairs, where
 from caster_gym.mechanics.separation import Hull, Obstacles, Surroundings, clearance, separation
-from caster_gym.mechanics.slip_state import unpack_slip_state
 
 _FAR = 1e6  # [m] where nobody comes
-
-
-class Given(NamedTuple):
-    """What drives the robots during a control period, and what they are: numbers for all, or tensors (robots,)."""
-
-    commands: Tensor  # (2 N, robots), −1 … 1
-    push: Tensor  # (3, robots) external wrench at C, in B [N, N, N m]
-    robot: RobotParameters
 
 
 class _Radii(NamedTuple):
@@ -145,22 +136,18 @@ class TorchSurroundings:
         near = (room < 0.0).nonzero()[:, 0]
         if not len(near):
             return bodies, record, room
-        n = 2 * len(given.robot.casters)
         commands, (x, y, z) = given.commands[:, near].unbind(0), given.push[:, near].unbind(0)
         robot = pytree.tree_map_only(Tensor, lambda one: one[near], given.robot)
         obstacles = self.beside(paths[near])
-        rows = bodies[:, near].unbind(0)
-        state = unpack_state(rows) if floor is None else unpack_slip_state(rows)
+        state = state_of(bodies[:, near], floor)
         surface = None if floor is None else surface_below(state, robot, floor)
         end, drive, touch = guarded_driven_step(
             state, pairs(commands), (x, y, z), h, robot, self.hull, obstacles, 0, len(self._spans), surface
         )
-        end_of_record = n + len(RECORD)
-        happened = record_of(Record(*record[n:end_of_record, near].unbind(0)), drive, touch, share)
-        slips = list(record[end_of_record:, near].unbind(0))
-        if floor is not None:
-            slips = [torch.maximum(now, before) for now, before in zip(slip_speeds(end, robot), slips, strict=True)]
-        torques = record[:n, near] + share * torch.stack(flatten(drive.torques))
+        torques, numbers, before = record_parts(record[:, near], len(robot.casters))
+        happened = record_of(Record(*numbers.unbind(0)), drive, touch, share)
+        slips = () if floor is None else each(torch.maximum, (), slip_speeds(end, robot), before.unbind(0))
+        torques = torques + share * torch.stack(flatten(drive.torques))
         gap = clearance(end.position, end.heading, self.hull, obstacles, 0, len(self._spans))
         return (
             bodies.index_copy(1, near, torch.stack(pack_state(end))),

@@ -32,6 +32,14 @@ class TorchSource(Protocol):
         ...
 
 
+def torch_source(source: Any, task: str, dtype: torch.dtype, device: torch.device) -> TorchSource:
+    """The reference source of a task, by name, for a batch of tensors. Raises ValueError where there is none."""
+    if not hasattr(source, "on_tensors"):
+        raise ValueError(f"task {task!r} does not run on tensors: its {type(source).__name__} has no on_tensors")
+    made: TorchSource = source.on_tensors(dtype, device)
+    return made
+
+
 def torch_weights(numbers: Any, dtype: torch.dtype, device: torch.device) -> tuple[Tensor, ...]:
     """Tensors (1,): a Python number times a flag of 0 or 1 would have Torch's default precision."""
     return torch.as_tensor(numbers, dtype=dtype, device=device)[:, None].unbind(0)

@@ -16,7 +16,8 @@ from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, Seeds, check
 from caster_gym.envs.native.engine import DRAW_A_PATH
 from caster_gym.envs.spaces import action_space, observation_space
 from caster_gym.envs.starts import read_options, read_start
-from caster_gym.envs.tensor.task import TaskOutcome, TaskState, TorchTask
+from caster_gym.envs.tensor.state import TaskOutcome, TaskState
+from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.paths.specification import PathLike
 from caster_gym.robot import Robot
