@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal, assert_equal
 
 from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out, training_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
@@ -57,7 +57,7 @@ FOLLOW = parse(
 
 def assert_same(first, second):
     for name, mine, other in zip(Episodes._fields, first, second, strict=True):
-        assert_array_equal(mine, other, name)
+        assert_equal(mine, other, name)
 
 
 def test_every_path_gets_its_starts_and_every_agent_the_same():

@@ -70,7 +70,7 @@ def test_no_design_of_a_dense_grid_is_more_isotropic(even):
     """The grid's step of 1.2 mm is 3 % of the optimum's radius, around which the index falls by a tenth of that."""
     radius, trail = allowed(31)
     tops = [motor.max_speed for caster in ROBOT.casters for motor in (caster.roll, caster.steer)]
-    values = global_isotropies(ROBOT, ROBOT.joints, radius, trail, (1.0, 1.0, 1.5), tops, isotropy_interval(3))
+    values = global_isotropies(ROBOT, ROBOT.joints, (1.0, 1.0, 1.5), tops, radius, trail, isotropy_interval(3))
     assert values.max() <= even.value + 1e-9
     assert values.max() == pytest.approx(even.value, rel=2e-2)
 

@@ -157,7 +157,9 @@ def test_an_action_that_is_no_number_ends_its_robots_episode_alone():
 
 
 def test_bad_input_is_refused():
-    with pytest.raises(ValueError, match='the task must be "track" or "follow", got \'race\''):
+    with pytest.raises(
+        ValueError, match="the task must be 'track', 'follow', 'hold' or 'module:Name' of your own, got 'race'"
+    ):
         TorchVectorEnv("race", 2)
     with pytest.raises(ValueError, match=r"dtype must be torch\.float32 or torch\.float64, got torch\.float16"):
         TorchVectorEnv("track", 2, dtype=torch.float16)
