@@ -14,6 +14,7 @@ from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.robot import load_robot
 from caster_gym.shipped_files import find, read_settings
 from caster_gym.tasks.follow.parameters import FollowParameters
+from caster_gym.tasks.registry import KNOWN
 from caster_gym.tasks.track.parameters import TrackParameters
 
 CONFIGS = Path(str(files("caster_gym.configs")))
@@ -73,6 +74,8 @@ def test_what_is_wrong_with_a_task_is_named():
         parse(TaskSettings, {**PATHS, "trial": []}, "task")
     with pytest.raises(ConfigurationError, match="train"):
         parse(TaskSettings, {**PATHS, "train": []}, "task")
+    with pytest.raises(ConfigurationError, match="unknown key 'parameters'; it is called 'task' here"):
+        parse(TaskSettings, {**PATHS, "parameters": {"corridor": 1.0}}, "task")
     with pytest.raises(ConfigurationError, match=r"unknown key 'task\.coridor'; did you mean 'corridor'\?"):
         parse(TaskSettings, {**PATHS, "task": {"coridor": 1.0}}, "task")
 
@@ -90,7 +93,7 @@ def test_an_environment_has_tasks_of_its_own():
     [
         (
             {"environment": "flow"},
-            "task: 'environment' should be 'track', 'follow', 'hold' or 'module:Name' of your own, got 'flow'$",
+            f"task: 'environment' should be {KNOWN}, got 'flow'$",
         ),
         ({"task": {"speed_limit": 1.0}}, "'speed_limit' is for environment 'follow', got it with environment 'track'"),
         (

@@ -55,14 +55,23 @@ def test_the_new_kind_of_obstacle_is_where_it_says():
 
 
 def change(root, title):
-    """Change a copy of the package as a section says; each piece of a change has a place of its own in the file."""
+    """Change a copy of the package as a section says, under names that nobody has taken.
+
+    Each piece adds lines beside one that it shows, wherever that line is now.
+    """
     name, *pieces = recipe(title, "diff").removeprefix("--- ").split("\n@@\n")
     text = (root / name).read_text(encoding="utf-8")
     for piece in pieces:
         lines = piece.splitlines()
-        before, after = ("\n".join(line[1:] for line in lines if line[:1] not in left_out) for left_out in "+-")
-        assert text.count(before + "\n") == 1, before
-        text = text.replace(before, after)
+        (anchor,) = [line[1:] for line in lines if line[0] == " "]
+        added = [
+            re.sub(r"\b(power(?=[:=])|reference_twist\b)", r"tried_\1", line[1:]) for line in lines if line[0] != " "
+        ]
+        assert all(line[0] in "+ " for line in lines)
+        assert text.count(f"\n{anchor}\n") == 1, anchor
+        place = len(added) if lines[-1][1:] == anchor else 0
+        added.insert(place, anchor)
+        text = text.replace(f"\n{anchor}\n", "\n" + "\n".join(added) + "\n")
     (root / name).write_text(text, encoding="utf-8")
 
 
@@ -101,9 +110,10 @@ def test_a_new_reward_term_and_a_new_channel_shift_nothing(copied):
             one, many, there = single.step(actions[0]), batch.step(actions), tensors.step(torch.as_tensor(actions))
 
         observation, reward, *_, info = one
-        assert tuple(info["reward_terms"]) == TASK.terms._fields and "power" in TASK.terms._fields
+        assert tuple(info["reward_terms"]) == TASK.terms._fields and "tried_power" in TASK.terms._fields
         assert reward == sum(info["reward_terms"].values())
-        assert info["power"] > 0.0 and info["reward_terms"]["power"] == -0.001 * info["power"]
+        assert info["power"] > 0.0
+        assert_allclose(info["reward_terms"]["tried_power"], 0.02 / (1.0 + (info["power"] / 20.0) ** 2), rtol=1e-12)
         assert_array_equal(info["pose"], single.engine.states[0][:4])
         assert_array_equal(info["reference_pose"], single.engine.plan.tables[0][3][:4])
         assert_allclose(info["torque"], [0.04, 0.02] * 3, rtol=1e-6)  # float32 shares of 0.2 and 0.1 N m
@@ -111,7 +121,8 @@ def test_a_new_reward_term_and_a_new_channel_shift_nothing(copied):
 
         layout = single.engine.layout
         assert layout.size == observation.size == single.observation_space.shape[0]
-        error, twist, wanted = (layout.physical(observation, n) for n in ("twist_error", "twist", "reference_twist"))
+        names = "twist_error", "twist", "tried_reference_twist"
+        error, twist, wanted = (layout.physical(observation, name) for name in names)
         assert_allclose(wanted, twist + error, atol=1e-6)  # float32 of order 1
         assert_allclose(twist, single.engine.states[0][4:7], rtol=1e-6)
         directions = layout.physical(observation, "directions").reshape(-1, 2)
@@ -142,8 +153,9 @@ def test_a_channel_of_another_width_than_its_units_is_refused_at_import(copied):
     change(copied, "Add an observation channel")
     file = copied / "caster_gym/envs/observation.py"
     text = file.read_text(encoding="utf-8")
-    assert text.count("vx, vy, view.reference.omega") == 1
-    file.write_text(text.replace("vx, vy, view.reference.omega", "vx, vy"), encoding="utf-8")
+    head, _, tail = text.partition("def tried_reference_twist(")
+    tail = tail.replace("vx, vy, view.reference.omega", "vx, vy", 1)
+    file.write_text(f"{head}def tried_reference_twist({tail}", encoding="utf-8")
     said = run_in(copied, "import caster_gym.envs.observation").stderr
-    assert "channel 'reference_twist' of the observation has 3 units, and its function" in said
-    assert "reference_twist gives 2 numbers" in said
+    assert "channel 'tried_reference_twist' of the observation has 3 units per robot, and its function" in said
+    assert "tried_reference_twist gives 2 numbers" in said

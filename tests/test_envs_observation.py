@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from caster_gym.envs.observation import GAP_UNIT, Neighbour, ObservationLayout, observation_size
+from caster_gym.envs.observation import (
+    CHANNELS,
+    GAP_UNIT,
+    Channel,
+    Neighbour,
+    ObservationLayout,
+    check_channels,
+    directions,
+    observation_size,
+    preview,
+    twist,
+)
 from tests.random_robots import random_robot
 
 
@@ -34,3 +45,33 @@ def test_a_batch_of_observations_is_decoded_along_its_last_axis():
     layout = ObservationLayout(random_robot(304, 3), (0.1,))
     batch = np.random.default_rng(5).normal(size=(2, 4, layout.size)).astype(np.float32)
     assert_array_equal(layout.physical(batch, "twist")[1, 2], layout.physical(batch[1, 2], "twist"))
+
+
+PAIR = (1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("channels", "sentence"),
+    [
+        ([Channel("mine", directions, PAIR, "")], r"'mine' of the observation has 2 units per robot, and its function"),
+        (
+            [Channel("mine", directions, PAIR, "")],
+            r'directions gives 4 numbers for a robot .* each; per="caster" would',
+        ),
+        ([Channel("mine", preview, (1.0,) * 7, "")], r'preview gives 21 numbers .*; per="point" would fit$'),
+        (
+            [Channel("mine", directions, PAIR, "", "obstacle")],
+            r'2 units per obstacle.*gives 4 .*per="caster" would fit',
+        ),
+        ([Channel("mine", twist, PAIR, "")], r"twist gives 3 numbers .*: there must be one for each$"),
+        (
+            [Channel("mine", lambda view: view.errors.ahead, (1.0,), "")],
+            r"'mine' .* gives a float, and must give a tuple",
+        ),
+        ([*CHANNELS, CHANNELS[0]], r"the observation has 2 channels 'position_error': each needs a name of its own"),
+    ],
+)
+def test_a_channel_that_would_shift_the_others_is_refused(channels, sentence):
+    """Its values are counted on a robot that has of nothing one, and of nothing as many as of another thing."""
+    with pytest.raises(TypeError, match=sentence):
+        check_channels(tuple(channels))

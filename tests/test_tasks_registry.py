@@ -124,7 +124,8 @@ def test_weights_are_the_parameters_of_their_names(name):
 
 
 def test_an_unknown_task_is_told_which_there_are():
-    with pytest.raises(ValueError, match="the task must be 'track', 'follow', 'hold' or 'module:Name' of your own"):
+    known = ", ".join(map(repr, TASKS))
+    with pytest.raises(ValueError, match=f"the task must be {known} or 'module:Name' of your own"):
         TorchTask("folow")
     with pytest.raises(ValueError, match="there is no module 'nowhere' in the working folder or among"):
         find_task("nowhere:TASK")

@@ -47,6 +47,7 @@ def _usual_names(parameters: set[str]) -> dict[str, str]:
     return {
         **inside,
         **usual,
+        **dict.fromkeys(("parameters", "params", "task_parameters", "fields"), "task"),
         "env": "environment",
         "env_id": "environment",
         "path": "the paths are those of 'train', 'validation' and 'test'",

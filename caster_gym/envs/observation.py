@@ -200,22 +200,39 @@ def observation_size(casters: int, points: int, nearest: int, channels: tuple[Ch
     return sum(len(channel.units) * items[channel.per] for channel in channels)
 
 
-def _check(channel: Channel) -> None:
-    """Refuse a channel that does not give a number for each of its units. Raises TypeError."""
-    robot = RobotParameters(PlatformParameters(*(1.0,) * PLATFORM_FIELDS), (CasterParameters(*(1.0,) * CASTER_FIELDS),))
+_PROBED = {"robot": 1, "caster": 2, "point": 3, "obstacle": 4}  # items, as many of each as of no other
+
+
+def check_channels(channels: tuple[Channel, ...]) -> None:
+    """Refuse two channels of one name, and one that does not give a number for each of its units. Raises TypeError."""
+    robot = RobotParameters(
+        PlatformParameters(*(1.0,) * PLATFORM_FIELDS), (CasterParameters(*(1.0,) * CASTER_FIELDS),) * 2
+    )
     point, reference = Point(*(1.0,) * len(Point._fields)), Reference(*(1.0,) * len(Reference._fields))
-    state = State((1.0, 1.0), (1.0, 0.0), (1.0, 1.0, 1.0), ((1.0, 0.0),), (), ())
-    errors = Errors(*(1.0,) * len(Errors._fields))
-    seen = channel.see(View(state, reference, errors, (point,), (Neighbour(1.0, 1.0, 0.0),), ((1.0, 1.0),), robot))
-    if len(seen) != len(channel.units):
-        raise TypeError(
-            f"channel {channel.name!r} of the observation has {len(channel.units)} units, and its function "
-            f"{channel.see.__name__} gives {len(seen)} numbers: there must be one for each"
-        )
+    state = State((1.0, 1.0), (1.0, 0.0), (1.0, 1.0, 1.0), ((1.0, 0.0),) * 2, (), ())
+    errors, neighbour = Errors(*(1.0,) * len(Errors._fields)), Neighbour(1.0, 1.0, 0.0)
+    view = View(state, reference, errors, (point,) * 3, (neighbour,) * 4, ((1.0, 1.0),) * 2, robot)
+    names = [channel.name for channel in channels]
+    for channel in channels:
+        name, units, function = channel.name, len(channel.units), f"its function {channel.see.__name__} gives"
+        if names.count(name) > 1:
+            raise TypeError(f"the observation has {names.count(name)} channels {name!r}: each needs a name of its own")
+        seen: object = channel.see(view)
+        if not isinstance(seen, tuple):
+            raise TypeError(
+                f"channel {name!r} of the observation: {function} a {type(seen).__name__}, and must give a tuple, of "
+                "one number (x,)"
+            )
+        if len(seen) != units * _PROBED[channel.per]:
+            others = [f'; per="{item}" would fit' for item, count in _PROBED.items() if len(seen) == units * count]
+            raise TypeError(
+                f"channel {name!r} of the observation has {units} units per {channel.per}, and {function} {len(seen)} "
+                f"numbers for a robot with 2 casters, 3 points and 4 obstacles: there must be one for each"
+                + "".join(others)
+            )
 
 
-for _channel in CHANNELS:
-    _check(_channel)
+check_channels(CHANNELS)
 
 
 class Part(NamedTuple):
@@ -238,8 +255,8 @@ class ObservationLayout:
     >>> robot = caster_gym.load_robot("chung2008")
     >>> layout = caster_gym.ObservationLayout(robot, preview=(0.1, 0.2, 0.4))  # as CasterTrack-v0 has it
     >>> observation, info = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate").reset(seed=0)
-    >>> layout.size, layout.physical(observation, "position_error").shape  # ahead and left [m]
-    (46, (2,))
+    >>> layout.size == observation.size, layout.physical(observation, "position_error").shape  # ahead and left [m]
+    (True, (2,))
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from caster_gym.envs.rows import check_names
 from caster_gym.mechanics.actuation import conditioning
 from caster_gym.mechanics.integration import State, difference, pack_state
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
-from caster_gym.mechanics.scalars import Direction, Scalar, each, sqrt, total, where
+from caster_gym.mechanics.scalars import Direction, Scalar, each, greatest, sqrt, total, where
 from caster_gym.paths.trajectory import COLUMNS
 
 
@@ -158,6 +158,24 @@ def endings(moment: Moment, weights: Any) -> Endings:
 def unless(failed: Scalar, term: Scalar) -> Scalar:
     """The term, or 0 in a step that ends the episode."""
     return where(failed > 0.5, 0.0, term)
+
+
+def evaluate_by(
+    state: Any,
+    reference: Any,
+    torques: Any,
+    record: Any,
+    situation: Any,
+    robot: Any,
+    weights: Any,
+    endings: Any,
+    reward: Any,
+) -> Any:
+    """Errors, endings, and the reward's terms, all 0 where the episode ends, from the functions of a task."""
+    errors = tracking_errors(state, reference)
+    moment = Moment(state, reference, errors, mean_effort(torques, robot), record, situation)
+    ended = endings(moment, weights)
+    return errors, ended, each(unless, (greatest(ended),), reward(moment, weights)[:])
 
 
 def report(

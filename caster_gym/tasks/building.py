@@ -22,8 +22,10 @@ from caster_gym.envs.plan import Pace, Plan
 from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import check_slips, robot_on, with_greatest_friction
 from caster_gym.mechanics.separation import Surroundings
+from caster_gym.own_errors import OwnCodeError
 from caster_gym.paths.specification import AnyPath, PathLike, read_paths
 from caster_gym.robot import Robot, load_robot
+from caster_gym.tasks.checks import check_reward
 from caster_gym.tasks.parameters import TaskParameters
 from caster_gym.tasks.task import Task, Way
 
@@ -65,12 +67,17 @@ def _plan(
     task: Task, robot: Robot, paths: tuple[AnyPath, ...], arena: Arena, parameters: TaskParameters, longest: int | None
 ) -> Plan:
     """The plan of a task, shared between the environments of a process."""
+    weights = task.weights_of(parameters)
+    check_reward(task, task.weights(*weights.tolist()))
     source: Any
     source, ways = task.lay_out(robot, paths, parameters)
+    if type(source) is not task.source:
+        given, wanted = type(source).__name__, task.source.__name__
+        raise OwnCodeError(f"lay_out of task {task.name!r} gives a {given}, and must give a {wanted}, its source")
     spans = source.spans.copy()
     if longest is not None:
         spans[:, 2] = np.minimum(spans[:, 2], longest)
-    source = source._replace(spans=spans, weights=task.weights_of(parameters))
+    source = source._replace(spans=spans, weights=weights)
     around, arenas = _arenas(arena, robot, ways, parameters)
     names, tables = tuple(way.name for way in ways), tuple(way.table for way in ways)
     terms: Any = task.terms

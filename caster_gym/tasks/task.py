@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from caster_gym.envs.native.reference import TaskCode, register_task
 from caster_gym.envs.tracking import endings
+from caster_gym.own_errors import OwnCodeError
 from caster_gym.paths.specification import AnyPath, PathLike
 from caster_gym.robot import Robot
 from caster_gym.tasks.measuring import Metrics
@@ -101,5 +103,12 @@ class Task:
         return getattr(import_module(self.environment.partition(":")[0]), self.title + suffix)
 
     def weights_of(self, parameters: TaskParameters) -> NDArray[np.float64]:
-        """The reward's numbers (weights,)."""
-        return np.array([float(getattr(parameters, name)) for name in self.weights._fields])
+        """The reward's numbers (weights,). Raises OwnCodeError for a weight that is no parameter."""
+        numbers = [getattr(parameters, name, None) for name in self.weights._fields]
+        for name, number in zip(self.weights._fields, numbers, strict=True):
+            if not isinstance(number, Real):
+                raise OwnCodeError(
+                    f"task {self.name!r}: each field of {self.weights.__name__} must be a number of "
+                    f"{type(parameters).__name__}, and {name!r} is none there"
+                )
+        return np.array(numbers, dtype=np.float64)

@@ -16,9 +16,9 @@ from caster_gym.engines.native.compiler import INLINE, borrowed, teach
 from caster_gym.engines.native.lanes import counting
 from caster_gym.engines.native.outside_sources import is_own, note_outside
 from caster_gym.envs import observation, report, tracking
-from caster_gym.envs.tracking import Moment, mean_effort, tracking_errors, unless
+from caster_gym.envs.tracking import evaluate_by
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import each, greatest
+from caster_gym.mechanics.scalars import each
 
 teach(report)
 teach(tracking)
@@ -97,27 +97,6 @@ def evaluate(state: Any, reference: Any, torques: Any, record: Any, situation: A
     """Errors, endings, and the reward's terms."""
     code = _BY_WEIGHTS[type(weights)]
     return evaluate_by(state, reference, torques, record, situation, robot, weights, code.endings, code.reward)
-
-
-def evaluate_by(
-    state: Any,
-    reference: Any,
-    torques: Any,
-    record: Any,
-    situation: Any,
-    robot: Any,
-    weights: Any,
-    endings: Any,
-    reward: Any,
-) -> Any:
-    """Errors, endings, and the reward's terms, all 0 where the episode ends, from the functions of a task."""
-    errors = tracking_errors(state, reference)
-    moment = Moment(state, reference, errors, mean_effort(torques, robot), record, situation)
-    ended = endings(moment, weights)
-    return errors, ended, each(unless, (greatest(ended),), reward(moment, weights)[:])
-
-
-register_jitable(**INLINE)(evaluate_by)
 
 
 @register_jitable(**INLINE)

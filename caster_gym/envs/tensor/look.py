@@ -12,14 +12,13 @@ from torch import Tensor
 
 from caster_gym.engines.tensor.motion import state_of
 from caster_gym.envs.native.layout import as_many
-from caster_gym.envs.native.reference import evaluate_by
 from caster_gym.envs.observation import GAP_LIMIT, Neighbour, ObservationLayout, View, observe
 from caster_gym.envs.plan import Plan
 from caster_gym.envs.report import REPORT, Deviation, Endings, Pose, Record, Report, Situation, flat_report, sum_of
 from caster_gym.envs.tensor.obstacles import TorchSurroundings
 from caster_gym.envs.tensor.reference import Guidance, TorchSource, torch_weights
 from caster_gym.envs.tensor.state import TaskOutcome, record_parts
-from caster_gym.envs.tracking import Errors, Reference, distance_square, report
+from caster_gym.envs.tracking import Errors, Reference, distance_square, evaluate_by, report
 from caster_gym.mechanics.floor import FloorTable
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State

@@ -59,8 +59,8 @@ class TorchTask:
     >>> actions = torch.zeros(16, 6, requires_grad=True)
     >>> state, outcome = task.step(state, actions)
     >>> outcome.rewards.sum().backward()
-    >>> outcome.observations.shape, actions.grad.shape
-    (torch.Size([16, 46]), torch.Size([16, 6]))
+    >>> outcome.observations.shape == (16, task.layout.size), actions.grad.shape
+    (True, torch.Size([16, 6]))
     """
 
     def __init__(

@@ -48,8 +48,8 @@ class TorchVectorEnv:
     >>> batch = caster_gym.TorchVectorEnv("track", num_envs=16, path="lemniscate", device="cpu")
     >>> observations, infos = batch.reset(seed=0)
     >>> observations, rewards, terminated, truncated, infos = batch.step(torch.zeros(16, 6))
-    >>> observations.shape, rewards.shape
-    (torch.Size([16, 46]), torch.Size([16]))
+    >>> observations.shape == (16, batch.task.layout.size), rewards.shape
+    (True, torch.Size([16]))
     """
 
     autoreset_mode = AutoresetMode.SAME_STEP

@@ -43,10 +43,10 @@ def reward(moment: Moment, weights: FollowWeights) -> FollowTerms:
     near = both_kernels(distance_square(moment.errors), weights.cross_track_scale, weights.coarse)
     turned = both_kernels(turn_square(moment.errors), weights.heading_scale, weights.coarse)
     return FollowTerms(
-        weights.progress_weight * share,
-        weights.cross_track_weight * share * near,
-        weights.heading_weight * share * turned,
-        -weights.effort_weight * moment.effort,
-        -weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
-        weights.effort_weight + weights.impact_weight,
+        progress=weights.progress_weight * share,
+        cross_track=weights.cross_track_weight * share * near,
+        heading=weights.heading_weight * share * turned,
+        effort=-weights.effort_weight * moment.effort,
+        impact=-weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
+        alive=weights.effort_weight + weights.impact_weight,
     )

@@ -46,10 +46,10 @@ def reward(moment: Moment, weights: HoldWeights) -> HoldTerms:
     near = both_kernels(distance_square(errors), weights.position_scale, weights.coarse)
     turned = both_kernels(turn_square(errors), weights.heading_scale, weights.coarse)
     return HoldTerms(
-        weights.position_weight * near,
-        weights.heading_weight * turned,
-        weights.rest_weight * near * turned * kernel(rate, 1.0),
-        -weights.effort_weight * moment.effort,
-        -weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
-        weights.effort_weight + weights.impact_weight,
+        position=weights.position_weight * near,
+        heading=weights.heading_weight * turned,
+        rest=weights.rest_weight * near * turned * kernel(rate, 1.0),
+        effort=-weights.effort_weight * moment.effort,
+        impact=-weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
+        alive=weights.effort_weight + weights.impact_weight,
     )

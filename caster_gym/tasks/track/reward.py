@@ -50,10 +50,10 @@ def reward(moment: Moment, weights: TrackWeights) -> TrackTerms:
     heading = both_kernels(turn_square(errors), weights.heading_scale, wide)
     speed = 0.5 * (kernel(rate, 1.0) + kernel(rate, wide))
     return TrackTerms(
-        weights.position_weight * position,
-        weights.heading_weight * heading,
-        weights.speed_weight * speed,
-        -weights.effort_weight * moment.effort,
-        -weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
-        weights.effort_weight + weights.impact_weight,
+        position=weights.position_weight * position,
+        heading=weights.heading_weight * heading,
+        speed=weights.speed_weight * speed,
+        effort=-weights.effort_weight * moment.effort,
+        impact=-weights.impact_weight * impact_share(moment.record.pressing, weights.impact_scale),
+        alive=weights.effort_weight + weights.impact_weight,
     )

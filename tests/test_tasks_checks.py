@@ -1,0 +1,115 @@
+"""tasks.checks, tasks.building: a task whose parts do not fit each other is refused before anything compiles."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import pytest
+
+from caster_gym.engines.native.compilation import compilations
+from caster_gym.envs.report import Endings
+from caster_gym.envs.tensor.task import TorchTask
+from caster_gym.own_errors import OwnCodeError
+from caster_gym.tasks.building import build_engine
+from caster_gym.tasks.checks import check_reward
+from caster_gym.tasks.hold.reference import Poses
+from caster_gym.tasks.registry import TASKS, find_task
+from caster_gym.tasks.track import TASK
+from caster_gym.tasks.track.reference import Timetable
+from tests.moments import weights_of
+
+
+class Terms(NamedTuple):
+    near: float
+    power: float
+
+
+class Swapped(NamedTuple):
+    power: float
+    near: float
+
+
+class Weights(NamedTuple):
+    corridor: float
+    touching_ends: float
+    effort_weight: float
+
+
+class Careless(NamedTuple):
+    effort_weight: float
+
+
+class Unknown(NamedTuple):
+    corridor: float
+    touching_ends: float
+    power_weight: float
+
+
+def complete(moment, weights):
+    return Terms(power=-weights.effort_weight * moment.record.power, near=1.0)
+
+
+def task_with(reward=complete, source=Timetable, **other):
+    """The tracking task with other parts; nothing is taught to the compiler."""
+    task = object.__new__(type(TASK))
+    fields = {field.name: getattr(TASK, field.name) for field in dataclasses.fields(TASK)}
+    changed = {"name": "mine", "terms": Terms, "weights": Weights, "reward": reward, "source": source, **other}
+    for name, value in (fields | changed).items():
+        object.__setattr__(task, name, value)
+    return task
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_tasks_that_come_with_the_package_fit(name):
+    task = find_task(name)
+    check_reward(task, weights_of(task))
+
+
+WRONG: dict[str, dict[str, Any]] = {
+    r"the reward of task 'mine': TypeError: Terms\.__new__\(\) missing 1 required positional argument: 'power': "
+    r"Terms \(near, power\) takes one number for each \(.*test_tasks_checks\.py, line \d+\)": {
+        "reward": lambda moment, weights: Terms(near=1.0)  # type: ignore[call-arg]
+    },
+    r"Terms\.__new__\(\) got an unexpected keyword argument 'rest'": {
+        "reward": lambda moment, weights: Terms(near=1.0, power=0.0, rest=1.0)  # type: ignore[call-arg]
+    },
+    r"the reward of task 'mine' gives Swapped \(power, near\), and must give Terms \(near, power\), which the task": {
+        "reward": lambda moment, weights: Swapped(1.0, 2.0)
+    },
+    r"the reward of task 'mine' gives a float, and must give Terms": {"reward": lambda moment, weights: 1.0},
+    r"the reward of task 'mine' must give a number as 'near', and gives \(0\.5, 0\.5, 0\.5\)": {
+        "reward": lambda moment, weights: Terms(moment.state.twist, 0.0)
+    },
+    r"the reward of task 'mine': AttributeError: 'Weights' object has no attribute 'power_weight': Weights \(corridor, "
+    r"touching_ends, effort_weight\) names the parameters of TrackParameters that it may use": {
+        "reward": lambda moment, weights: Terms(weights.power_weight, 0.0)
+    },
+    r"task 'mine': each field of Unknown must be a number of TrackParameters, and 'power_weight' is none there": {
+        "weights": Unknown
+    },
+    r"the endings of task 'mine': AttributeError: 'Careless' object has no attribute 'corridor'": {"weights": Careless},
+    r"the endings of task 'mine' gives Terms \(near, power\), and must give Endings \(left_corridor, ": {
+        "endings": complete
+    },
+    r"lay_out of task 'mine' gives a Timetable, and must give a Poses, its source": {"source": Poses},
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_what_does_not_fit_is_told_before_anything_is_compiled(sentence):
+    """By what makes the engines of environments and by tensors alike."""
+    task, before = task_with(**WRONG[sentence]), compilations()
+    with pytest.raises(OwnCodeError, match=sentence):
+        build_engine(task, "chung2008", "circle", None, None, {}, 1)
+    with pytest.raises(OwnCodeError, match=sentence):
+        TorchTask(task, path="circle")
+    assert compilations() == before
+
+
+@pytest.mark.parametrize("number", [lambda weights: 1.0 / (weights.effort_weight - 0.02), lambda _: math.sqrt(-1.0)])
+def test_arithmetic_that_fails_for_the_numbers_tried_is_no_mistake(number):
+    """Compiled, they give infinity or no number; of the moments that come, none may be such."""
+    task = task_with(
+        reward=lambda moment, weights: Terms(number(weights), 0.0), endings=lambda *_: Endings(0.0, 0.0, 0.0)
+    )
+    check_reward(task, weights_of(task))
