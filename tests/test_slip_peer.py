@@ -5,21 +5,8 @@ import pytest
 
 from caster_gym import load_robot
 from caster_gym.shipped_files import names_of
-from scripts.slip_peer import (
-    OUR_STEPS,
-    STEPS,
-    Comparison,
-    Rate,
-    draw_courses,
-    measure,
-    off,
-    on_three,
-    ours,
-    page,
-    peer,
-    scenarios,
-    write_table,
-)
+from scripts.slip_peer import draw_courses, page, write_table
+from scripts.slip_runs import OUR_STEPS, STEPS, Comparison, Rate, measure, off, on_three, ours, peer, scenarios
 
 FINE = 1.25e-4  # [s] MuJoCo's
 

@@ -129,11 +129,9 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             self.render()
         return outcome.observations, outcome.rewards, outcome.terminated, outcome.truncated, infos
 
+    # Gymnasium's type knows no grid, one image of several robots
     def render(self) -> tuple[NDArray[np.uint8], ...] | NDArray[np.uint8] | None:  # type: ignore[override]
-        """Frames (height, width, 3) of the robots, one of a grid of the first 16, or a window, as `render_mode` says.
-
-        Gymnasium's type knows no grid.
-        """
+        """Frames (height, width, 3) of robots, one of a grid of the first 16, or a window, as `render_mode` says."""
         if not self._started:
             raise RuntimeError("reset every robot before they are drawn")
         return self._renderer.show_batch()
