@@ -156,7 +156,7 @@ def write_page(name: str, title: str, reference: str, sections: Sequence[Section
 
 
 def differences_page(out: Path, names: Sequence[str]) -> str:
-    """The page of all differences, of all papers whose folders are there, parted by their nature."""
+    """The page of all differences, of all papers whose folders are there, sorted by their nature."""
     rows: list[list[str]] = []
     there = [name for name in names if (out / name / "differences.csv").is_file()]
     for name in there:
@@ -164,7 +164,7 @@ def differences_page(out: Path, names: Sequence[str]) -> str:
             rows += [[row["tag"], f"[{name}]({name}.md)", *list(row.values())[1:]] for row in csv.DictReader(lines)]
     rows.sort(key=lambda row: _number(row[0]))
     columns = ("", "paper", "where", "as printed", "correct", "evidence")
-    parts = ["# Where the papers and we differ", _ABOUT_SCANS]
+    parts = ["# Where the papers and caster_gym differ", _ABOUT_SCANS]
     for title, text, natures in _PARTS:
         chosen = [row for row in rows if row[-1] in natures]
         if chosen:
@@ -174,13 +174,13 @@ def differences_page(out: Path, names: Sequence[str]) -> str:
             parts += [
                 f"## {title} ({count})",
                 text,
-                markdown_table((*columns, "the scan's fault") if both else columns, table),
+                markdown_table((*columns, "scan at fault") if both else columns, table),
             ]
     repairs = [(f"[{name}]({name}.md)", *repair) for name in there for repair in REPAIRS.get(name, ())]
     if repairs:
-        text = "What could be read in one way only was repaired and is counted nowhere."
+        text = "Places that can be read in one way only were repaired, and do not count as differences."
         parts += [
-            "## Repaired without counting",
+            "## Repairs that do not count",
             text,
             markdown_table(("paper", "where", "as scanned", "read as"), repairs),
         ]
@@ -188,26 +188,26 @@ def differences_page(out: Path, names: Sequence[str]) -> str:
 
 
 _ABOUT_SCANS = """\
-The source of both papers is a scanned text, not the print. Character recognition loses signs, dots and indices, and so
-some of what follows may stand correctly in print. The list is therefore parted by what can be known from the scan. Each
-entry stands with the evidence that decides, as measured by `python -m papers`; an entry with several rows was
-measured in several ways and counts once."""
+This page lists where the two papers differ from caster_gym, and why. Both papers were read from scanned text. Character
+recognition loses signs, dots and indices, so the print may be right where the scan is wrong; the list is therefore
+divided by what the scan allows us to know. Each entry has the evidence that decides, as measured by `python -m papers`.
+An entry with several rows was measured in several ways and counts once."""
 _PARTS: tuple[tuple[str, str, tuple[Nature, ...]], ...] = (
     (
-        "What the print must have wrong",
-        "Shown by mathematics: no single misread character would mend the statement.",
+        "Errors of the print",
+        "Mathematics shows that the statement is wrong, and no single misread character explains it.",
         ("print",),
     ),
     (
-        "What the scan may have garbled",
-        "One lost or changed character would explain the difference, and the print may well be right. The scan is "
-        "probably at fault where the text around it states the right thing, or where characters of that kind are often "
-        "lost; it is possibly at fault where a wrong sign or letter makes a formula that looks whole.",
+        "Possible errors of the scan",
+        "One lost or changed character would explain the difference, so the print may well be right. The scan is "
+        "probably at fault if the text around it says the right thing, or if characters of that kind are often lost. "
+        "It is possibly at fault if a wrong sign or letter makes a formula that looks complete.",
         ("scan, probably", "scan, possibly"),
     ),
     (
         "What depends on the reading",
-        "These statements hold in one sense and fail in another. They are no errors of the papers.",
+        "These statements are true in one sense and false in another. They are not errors of the papers.",
         ("reading",),
     ),
 )
@@ -216,17 +216,17 @@ assert {nature for _, _, natures in _PARTS for nature in natures} == set(get_arg
 
 def _page(name: str, title: str, reference: str, sections: Sequence[Section]) -> str:
     own = [check for section in sections for check in section.checks if check.own]
-    told = (
-        f"{summary(sections)}. The reason stands beside each, and [differences.md](differences.md) lists all reasons "
-        "with the evidence. The source is a scanned text: the list says what the scan may have garbled."
+    text = (
+        f"{summary(sections)}. The tables give the reason for each, and [differences.md](differences.md) lists all "
+        "reasons with the evidence. The paper was read from scanned text; the list says where the scan may be wrong."
     )
     if own:
-        told += (
-            f" Checks of our own, among them those on other robots than the paper's, stand apart; "
+        text += (
+            f" Checks of our own, some of them on other robots than the paper's, are counted separately; "
             f"{sum(check.agrees for check in own)} of {len(own)} hold."
         )
-    told += f" Made by `python -m papers {name}`."
-    parts = [f"# {title}", reference, told]
+    text += f" `python -m papers {name}` makes this page."
+    parts = [f"# {title}", reference, text]
     for section in sections:
         parts += [f"## {section.title}", section.text.strip()]
         parts += _verdicts([check for check in section.checks if not check.own], ("what", "printed", "ours"), sections)

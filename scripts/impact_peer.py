@@ -156,10 +156,10 @@ def impact_table(impacts: list[Impact]) -> str:
     """A row for each robot, as Markdown: medians, least and greatest."""
     heads = (
         "robot",
-        "impulse here [N s]",
+        "our impulse [N s]",
         "MuJoCo [N s]",
         "without a floor [N s]",
-        "sideways here [m/s]",
+        "our sideways speed [m/s]",
         "MuJoCo [m/s]",
         "`impact_traction`",
     )
@@ -182,22 +182,25 @@ def page(impacts: list[Impact], command: str) -> str:
     """The comparison as Markdown."""
     draws = max(Counter(one.robot for one in impacts).values())
     parts = [
-        "# Impacts that the floor cannot hold",
+        "# Impacts that exceed the floor's friction",
         paragraph(
-            f"""In an impact the model lets the wheels roll on without slip: the robot weighs what M(δ) says, wheels and
-            rotors included, and the floor gives whatever impulse that takes. In the {1e3 * CONTACT_TIME:g} ms of a
-            contact a floor cannot give more than its friction allows: the wheels slip, and the wall meets a lighter
-            robot. Below, each robot runs head-on into a smooth wall at {SPEED:g} m/s with a restitution of
-            {RESTITUTION:g}, {draws} times with other steering angles. In MuJoCo the wall is a spring with the same
-            restitution and about the same contact time, and the floor has the friction of the robot's file."""
+            f"""This page compares impacts with MuJoCo's. In the model, wheels keep rolling without slip during an
+            impact: the robot's inertia is M(δ), which includes wheels and rotors, and the floor supplies whatever
+            impulse that takes. A real floor supplies no more than its friction allows in the {1e3 * CONTACT_TIME:g} ms
+            of a contact. If that is not enough, the wheels slip, and the wall meets a lighter robot. Below, each robot
+            runs head-on into a smooth wall at {SPEED:g} m/s with a restitution of {RESTITUTION:g}, {draws} times with
+            different steering angles. In MuJoCo the wall is a spring with the same restitution and about the same
+            contact time, and the floor has the friction given in the robot's file."""
         ),
         impact_table(impacts),
-        "Medians, least and greatest in brackets; [all of them](impacts.csv).",
+        "Medians, with minimum and maximum in brackets; [all impacts](impacts.csv).",
         paragraph(
-            """`impact_traction` is what the impact asks of the floor as a share of what the floor can give; info tells
-            it after every step. Where it is about 1 or less, both agree. Where it is far above 1, the impulse is nearly
-            that of a robot whose wheels nothing holds, which the table gives too: the mobility of MuJoCo's bodies
-            without the floor. On a floor of friction 1000, MuJoCo's impulses are ours (`tests/test_impact_peer.py`)."""
+            """`impact_traction` is the impulse that the impact needs from the floor, as a share of what the floor can
+            supply; `info` contains it after every step. Where it is about 1 or less, both models agree. Where it is far
+            above 1, MuJoCo's impulse is nearly that of a robot without a floor, which the table shows, too; it follows
+            from the mobility of MuJoCo's bodies. On a floor of friction 1000, MuJoCo's impulses equal ours
+            (`tests/test_impact_peer.py`). On a [floor of finite friction](../floor.md), wheels slip in our impacts,
+            too."""
         ),
         f"- Command: `{command}`\n- MuJoCo's time step: {1e3 * STEP:g} ms\n"
         f"- Versions: {versions_in_words('caster_gym', 'mujoco', 'numpy')}",

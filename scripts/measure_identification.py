@@ -125,7 +125,7 @@ def coverage_table(rows: list[Held]) -> str:
     names, laws = list(TRUTH), list(dict.fromkeys(row.law for row in rows))
     groups = [(law, [row for row in rows if row.law == law]) for law in laws]
     if len(laws) > 2:
-        groups.append(("all but the first", [row for row in rows if row.law != laws[0]]))
+        groups.append(("all other laws", [row for row in rows if row.law != laws[0]]))
     lines = []
     for title, own in groups:
         trusted = [row for row in own if not row.doubted]
@@ -133,7 +133,7 @@ def coverage_table(rows: list[Held]) -> str:
         warned = len({(row.law, row.recording) for row in own if row.doubted})
         cells = [_share([row for row in trusted if row.name == name]) for name in names]
         lines.append((title, str(count), str(warned), *cells, _share(trusted)))
-    return markdown_table(("friction", "recordings", "warned of", *names, "all"), lines)
+    return markdown_table(("friction", "recordings", "with a warning", *names, "all"), lines)
 
 
 def _share(rows: list[Held]) -> str:

@@ -37,24 +37,24 @@ def sections(robot: Robot, name: str, cores: int, seconds: float, quick: bool) -
     return [
         (
             "The equations alone",
-            """RK4 at 5 ms in float64, from random places and motions under random torques. The 8 obstacles are the
-            walls of a room of 4 m × 4 m and four pillars, off which the robots bounce.""",
+            """RK4 steps of 5 ms in float64, from random poses and twists, under random torques. The 8 obstacles are the
+            walls of a room of 4 m × 4 m and four pillars; robots bounce off them.""",
             bare_rows(robot, cores, seconds),
         ),
         (
             "Whole environments",
-            """A control period of 20 ms: RK4 substeps, observation, reward, infos and, where an episode has ended, the
-            reset. Actions are random, up to a tenth of the greatest torques, and the corridor is wide, so that episodes
-            end by time: after 6 to 13 s, so that in batches somebody's ends in nearly every step. Following is
-            CasterFollow-v0 on random paths.""",
+            """One step is a control period of 20 ms: RK4 substeps, observation, reward, infos, and the reset where an
+            episode has ended. Actions are random, up to a tenth of the maximum torques, and the corridor is wide.
+            Episodes therefore end by time, after 6 to 13 s; in large batches some episode ends in nearly every step.
+            "Following" is CasterFollow-v0 on random paths.""",
             environment_rows(name, cores, seconds),
         ),
-        ("One robot", "The time of a step.", single_rows(name, seconds)),
+        ("One robot", "The time of one step.", single_rows(name, seconds)),
         (
             "Peers",
-            """MuJoCo has the same robot as rigid bodies, without anything around its steps; the others are whole
-            environments, those in a loop counted by the steps of all. HalfCheetah makes 5 MuJoCo steps of 10 ms in one
-            of its own.""",
+            """MuJoCo simulates the same robot as rigid bodies, and nothing else. The other rows are whole environments;
+            a loop over environments counts the steps of all of them. One step of HalfCheetah consists of 5 MuJoCo steps
+            of 10 ms.""",
             peer_rows(robot, name, cores, seconds),
         ),
         (
@@ -64,8 +64,9 @@ def sections(robot: Robot, name: str, cores: int, seconds: float, quick: bool) -
         ),
         (
             "Start-up and memory",
-            """Each is a process of its own. Memory is what a big batch adds once a small one runs: to the process, and
-            by Python's and NumPy's own count; the environment includes Gymnasium's spaces and random generators.""",
+            """Each row is measured in a process of its own. Memory is what a large batch adds after a small one has
+            run: as growth of the process, and as counted by Python and NumPy. The environment includes Gymnasium's
+            spaces and random generators.""",
             [*starts, *([] if quick else memory_rows(name))],
         ),
     ]

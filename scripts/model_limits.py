@@ -45,33 +45,33 @@ def rows(robots: Sequence[Robot]) -> list[Row]:
 
     return [
         row(
-            "wheels that slip: friction used when all rolling motors give their greatest torque, forwards or braking",
+            "wheels that slip: use of friction at the maximum torque of all rolling motors, forwards or braking",
             "{:.2g}",
             '`floor`; `info["traction_use"]`',
             *(((at_full_torque(robot)[0]),) for robot in robots),
         ),
         row(
-            "the same with greatest torques of random signs on all motors: share of draws in which a wheel would slip "
-            "(in which one would lift)",
+            "the same with maximum torques of random signs on all motors: share of draws in which a wheel would slip "
+            "(would lift)",
             "{:.0%} ({:.0%})",
             "as above",
             *(random_shares(robot) for robot in robots),
         ),
         row(
-            f"impacts that the floor cannot hold: every second one is, above [m/s], in contacts of "
+            f"impacts that exceed the floor's friction: speed above which every second one does [m/s], in contacts of "
             f"{1e3 * CONTACT_TIME:g} ms",
             "{:.2g}",
             '`floor`; `info["impact_traction"]`',
             *((impact_speed(robot),) for robot in robots),
         ),
         row(
-            "loads that shift: friction used at full torque with the loads at rest → with those that it shifts",
+            "loads that shift: use of friction at full torque with the loads at rest → with the shifted loads",
             "{1:.2g} → {0:.2g}",
             "`platform.height`, in the robots' files",
             *(at_full_torque(robot) for robot in robots),
         ),
         row(
-            "wheels that lift: least acceleration [m/s²] that would do it",
+            "wheels that lift: smallest acceleration [m/s²] that lifts one",
             "{:.2g}",
             '`info["wheels_lifted"]`',
             *((lifting_acceleration(robot),) for robot in robots),
@@ -83,25 +83,25 @@ def rows(robots: Sequence[Robot]) -> list[Row]:
             *((creep(robot),) for robot in robots),
         ),
         row(
-            f"motors that follow late: way lost in the first second at full torque by a lag of {1e3 * LAG:g} ms [mm]",
+            f"motors that lag: distance lost in the first second at full torque with a lag of {1e3 * LAG:g} ms [mm]",
             "{:.2g}",
             "`motor_lag`, `action_delay`",
             *((way_lost(robot),) for robot in robots),
         ),
         row(
-            "rotors that couple both joints of a caster: accelerations off without it, median (95 % quantile)",
+            "rotors that couple both joints of a caster: error of accelerations without it, median (95 % quantile)",
             "{:.2g} % ({:.2g} %)",
             "`rotor`, in the robots' files",
             *(off_without(robot, "cross_armature") for robot in robots),
         ),
         row(
-            "(D1), which chung2008 leaves out: accelerations off without it, median (95 % quantile)",
+            "(D1), which chung2008 leaves out: error of accelerations without it, median (95 % quantile)",
             "{:.2g} % ({:.2g} %)",
             'always; `dynamics="chung2008"` leaves it out',
             *(off_without(robot, "off_axis") for robot in robots),
         ),
         row(
-            f"time steps of {1e3 * STEP:g} ms: off the exact motion after {SECONDS:g} s, median of 20 drives [µm]",
+            f"time steps of {1e3 * STEP:g} ms: error of the position after {SECONDS:g} s, median of 20 drives [µm]",
             "{:.2g}",
             "more `substeps`",
             *((step_error(robot),) for robot in robots),
@@ -243,7 +243,7 @@ Batteries keep their voltage. Spinning rotors do not tilt the robot. Sensors are
 ## Compared with other people's code
 
 - [MuJoCo's motion](truth/mujoco.md): the limit of rolling without slip, and the effect of dry friction at rest.
-- [Impacts](truth/impacts.md): impacts that the floor cannot hold.
+- [Impacts](truth/impacts.md): impacts that exceed the floor's friction.
 - [Slip](truth/slip.md): wheels that may slip (`floor`), beside MuJoCo's wheels on the same floor.
 
 - Command: `{command}`

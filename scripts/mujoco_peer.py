@@ -122,13 +122,13 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
     coarse, fine = 1e3 * STEPS[0], 1e3 * STEPS[-1]
     heads = (
         "robot",
-        "way of C [m]",
+        "length of C's path [m]",
         f"slip at {coarse:g} ms",
-        f"off the exact model at {coarse:g} ms [mm]",
+        f"distance from the exact model at {coarse:g} ms [mm]",
         f"at {fine:g} ms [mm]",
-        "extrapolated to no step [mm]",
-        "a half step leaves",
-        f"off the model without (D1) at {fine:g} ms [mm]",
+        "extrapolated to a step of zero [mm]",
+        "ratio after halving the step",
+        f"distance from the model without (D1) at {fine:g} ms [mm]",
     )
     rows = []
     for name in dict.fromkeys(one.robot for one in comparisons):
@@ -148,33 +148,35 @@ def page(comparisons: list[Comparison], creeps: list[Creep], command: str) -> st
     closer = sum(one.from_exact[-1] < 0.5 * one.from_incomplete[-1] for one in comparisons)
     draws = max(Counter(one.robot for one in comparisons).values())
     parts = [
-        "# Truth by somebody else's code: MuJoCo's motion",
+        "# Motions compared with MuJoCo's",
         paragraph(
-            """MuJoCo is given the same robots as rigid bodies: a platform that slides and turns in the plane, steering
-            links, and wheels that are spheres on a plane, held from sliding by the friction of its contact solver
+            """This page compares the motions of caster_gym with MuJoCo's. MuJoCo simulates the same robots as rigid
+            bodies: a platform that slides and turns in the plane, steering links, and wheels, which are spheres on a
+            plane. The friction of its contact solver keeps them from sliding
             ([mjcf.py](../../caster_gym/export/mjcf.py)). It knows joints, masses and contacts, but none of the
             equations in [equations.md](../equations.md). Its contacts are soft over a few time steps, so its wheels
             creep a little, and less with every smaller step."""
         ),
         paragraph(
-            f"""Each robot is driven {draws} times from rest for {DURATION:g} s, with wheels askew and constant torques,
-            drawn so that each joint pushes the floor with up to {100.0 * STRONG:.0f} % of the weight on its wheel and
-            no motor outruns its top speed. Compared is where the platform ends. Dry friction in the joints is left out,
-            since MuJoCo's jumps at rest where ours passes smoothly: see below."""
+            f"""Each robot is driven {draws} times from rest for {DURATION:g} s, with random steering angles and
+            constant torques. The torques are drawn so that each joint pushes the floor with up to {100.0 * STRONG:.0f}
+            % of the weight on its wheel and no motor exceeds its top speed. The table compares where the platform ends.
+            Dry friction of the joints is left out, because MuJoCo's jumps at rest, whereas ours passes smoothly through
+            zero; see below."""
         ),
         markdown_table(heads, rows),
-        "Medians over the drives, least and greatest in brackets; [all of them](convergence.csv).",
+        "Medians over the drives, with minimum and maximum in brackets; [all drives](convergence.csv).",
         paragraph(
-            f"""As its step goes to zero, MuJoCo ends where the exact model ends: each half step leaves half of the
-            distance, and what is left after extrapolating to no step is its error of second order. From the model
-            without (D1), the term that chung2008 lacks, it stays away by as much as the two models differ. In {closer}
-            of {len(comparisons)} drives MuJoCo's finest step ends at least twice as close to the exact model as to the
-            one without (D1)."""
+            f"""As its step goes to zero, MuJoCo ends where the exact model ends: halving the step halves the distance,
+            and what is left after extrapolation to a step of zero is an error of second order. MuJoCo's distance from
+            the model without (D1), the term that chung2008 lacks, stays as large as the difference between the two
+            models. In {closer} of {len(comparisons)} drives, MuJoCo with its finest step ends at least twice as close
+            to the exact model as to the one without (D1)."""
         ),
         "![Distance of MuJoCo's end from both models' ends, over MuJoCo's time step](convergence.png)",
         paragraph(
-            """*Thin lines are single drives, thick ones their medians. Blue falls in proportion to MuJoCo's step, as
-            the dotted line does: the exact model is its limit. Orange levels off: without (D1) the equations describe
+            """*Thin lines are single drives, thick lines their medians. Blue is proportional to MuJoCo's step, like the
+            dotted line, so the exact model is the limit. Orange levels off, because the equations without (D1) describe
             another robot.*"""
         ),
         *dry_friction(creeps),
@@ -191,18 +193,19 @@ def dry_friction(creeps: list[Creep]) -> list[str]:
     return [
         "## Dry friction does not hold",
         paragraph(
-            f"""Dry friction of a joint is `coulomb` · rate / √(rate² + `coulomb_speed`²): it passes smoothly through
-            zero, so that time steps can follow it, and a joint below its breakaway creeps instead of standing. Under a
-            share s of the torque at which it would break away, it turns at s / √(1 − s²) of `coulomb_speed`. Below, all
+            f"""The dry friction of a joint is `coulomb` · rate / √(rate² + `coulomb_speed`²). It passes smoothly
+            through zero, so that time steps can follow it. A joint below its breakaway torque therefore creeps instead
+            of standing still: under a share s of that torque, it turns at s / √(1 − s²) of `coulomb_speed`. Below, all
             casters trail and each rolling joint is driven by {100.0 * LOAD:g} % of its `coulomb` for {SECONDS:g} s.
-            MuJoCo holds its joints by a constraint, and creeps by the softness of its contacts and constraints."""
+            MuJoCo holds its joints by a constraint, and creeps because its contacts and constraints are soft."""
         ),
         creep_table(creeps),
         paragraph(
-            f"""In brackets: the fewest `substeps` of a control period of {1e3 * PERIOD:g} ms that follow the robot.
-            `coulomb_speed` is a number of the robot's file, {SPEEDS[0]:g} rad/s unless it says otherwise. A smaller one
-            makes a sharper law and asks for shorter time steps; too long ones are refused, with the number of substeps
-            that would do. Ask a sharp law whether a robot stands still under a load; for driving the usual one does."""
+            f"""The brackets contain the smallest number of `substeps`, for a control period of {1e3 * PERIOD:g} ms,
+            with which time steps follow the robot. `coulomb_speed` is a field of the robot's file, {SPEEDS[0]:g} rad/s
+            by default. A smaller value makes the law sharper and needs shorter time steps; steps that are too long are
+            refused, with the number of substeps that suffices. Use a small value to find out whether a robot stands
+            still under a load. For driving, the default suffices."""
         ),
     ]
 

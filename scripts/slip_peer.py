@@ -63,16 +63,16 @@ def draw_courses(file: Path, comparisons: list[Comparison]) -> None:
 
 UNITS = {
     "onset of slip": "first slip above 20 mm/s [ms]",
-    "drift": "way [mm]",
-    "spin-up of a wheel": "its rate at the end [rad/s]",
+    "drift": "distance from the start [mm]",
+    "spin-up of a wheel": "rate of that wheel at the end [rad/s]",
     "regrip": "last slip above 20 mm/s [ms]",
-    "braking": "way [mm]",
+    "braking": "distance from the start [mm]",
 }
 
 
 def comparison_table(comparisons: list[Comparison]) -> str:
     """What both say, scenario by scenario, as Markdown."""
-    heads = ("scenario", "measured", "robot", "ours", "MuJoCo", "ends apart [mm]", "at 5 ms ours is off [mm]")
+    heads = ("scenario", "measured", "robot", "ours", "MuJoCo", "distance of the ends [mm]", "our error at 5 ms [mm]")
     rows = []
     for name, unit in UNITS.items():
         for robot in dict.fromkeys(one.scene.robot.name for one in comparisons):
@@ -93,7 +93,14 @@ def comparison_table(comparisons: list[Comparison]) -> str:
 
 def rate_table(found: list[Rate], comparisons: list[Comparison]) -> str:
     """Errors of drifts beside simulated time, as Markdown."""
-    heads = ("robot", "side", "step [ms]", "drift off by [mm]", "simulated s per s of a core", "ours is faster by")
+    heads = (
+        "robot",
+        "side",
+        "step [ms]",
+        "error of the drift [mm]",
+        "simulated s per s of core",
+        "ours is faster by",
+    )
     rows = []
     for rate in found:
         mine = [one for one in comparisons if (one.scene.robot.name, one.scene.name) == (rate.robot, "drift")]
@@ -110,31 +117,34 @@ def rate_table(found: list[Rate], comparisons: list[Comparison]) -> str:
 def page(comparisons: list[Comparison], found: list[Rate], command: str) -> str:
     """The comparison as Markdown; picture and table lie beside it."""
     parts = [
-        "# A floor that wheels slip on",
+        "# Slip compared with MuJoCo's",
         paragraph(
-            f"""On a floor of finite friction (`floor: {{friction: 0.7}}`, section S of
-            [equations.md](../equations.md#s-a-floor-with-finite-friction)) wheels may slip. MuJoCo's elliptic cone has
-            the same law of friction; its contacts are springs and dampers, so that loads build up in some milliseconds
-            and wheels creep a little before they slip. Here the time constant of its contacts is {1e3 * SOFTNESS:g} ms,
-            and the platform may tip, with its mass centre at {HEIGHT:g} m. A contact that slides hops in MuJoCo: its
-            load comes in beats (`findings/mujoco_sliding_contact_hops.sh`), the teeth in the picture, and on four stiff
-            legs they set the robot rocking. So all robots stand on three of their casters here, where mean loads follow
-            from balance alone, and what their wheels do is compared in the mean. Ours is compared at a step of
-            {1e3 * OUR_STEPS[-1]:g} ms, MuJoCo at {1e3 * STEPS[-1]:g} ms."""
+            f"""This page compares robots whose wheels may slip with MuJoCo's, on a floor of finite friction (`floor:
+            {{friction: 0.7}}`, section S of [equations.md](../equations.md#s-a-floor-with-finite-friction)). MuJoCo's
+            elliptic cone has the same law of friction. Its contacts are springs and dampers, so that loads build up
+            within some milliseconds and wheels creep a little before they slip. Here the time constant of its contacts
+            is {1e3 * SOFTNESS:g} ms, and the platform may tip, with its mass centre at {HEIGHT:g} m. A sliding contact
+            hops in MuJoCo, so that its load pulsates (`findings/mujoco_sliding_contact_hops.sh`). These are the teeth
+            in the picture; on four stiff legs they make the robot rock. So all robots stand on three of their casters
+            here, where balance alone determines the mean loads, and the comparison is of mean motions. Our time step is
+            {1e3 * OUR_STEPS[-1]:g} ms, MuJoCo's {1e3 * STEPS[-1]:g} ms."""
         ),
         paragraph(
-            """Each robot is driven ever harder until its wheels slip; driven on all joints beyond what the floor holds,
-            with wheels askew; driven by one wheel that spins; set on the floor moving otherwise than its wheels roll,
-            until they grip; and braked by wheels that hardly turn. An end counts an angle as the way at 0.2 m."""
+            """There are five scenarios. In the first, the torques grow until the wheels slip. In the second, all joints
+            push harder than the floor can hold, with random steering angles. In the third, one driven wheel spins. In
+            the fourth, the robot starts with a motion that does not match the rates of its wheels, and slides until
+            they grip. In the fifth, wheels that hardly turn brake the robot. In distances between ends, an angle counts
+            as the arc at 0.2 m."""
         ),
         comparison_table(comparisons),
-        "Medians, least and greatest in brackets; [all of them](slip.csv).",
+        "Medians, with minimum and maximum in brackets; [all runs](slip.csv).",
         "![Slip over time, ours and MuJoCo's, in five scenarios](slip.png)",
         "*The wheel of tidybot2 that slips most, in the first draw.*",
-        "## Speed at an error",
+        "## Speed and error",
         paragraph(
-            """Robots that drift, on one core, in turns; the error is the distance of the ends of the drifts above from
-            ours at the shortest step, which for MuJoCo contains what its softer contacts do otherwise."""
+            """The table compares robots that drift, simulated in turns on one core. The error is the distance between
+            the ends of the drifts above and our ends at the shortest step. For MuJoCo, it includes the effect of its
+            softer contacts."""
         ),
         rate_table(found, comparisons),
         f"- Command: `{command}`\n- Versions: {versions_in_words('caster_gym', 'mujoco', 'numpy')}",

@@ -77,36 +77,38 @@ def _over(measured: Values, over: str, under: str) -> float:
 
 def _bare(measured: Values, rate: float, operations: int) -> str:
     kept = 100.0 * _over(measured, "bare_periods", "bare_cores")
-    return f"""**Bare equations: arithmetic.** An RK4 step of this robot is {operations:,} floating-point operations as
-        written, so {shown(rate)} steps/s are {1e-9 * operations * rate:.0f} billion operations a second on a core, in
-        float64 and strict IEEE order. Blocks of 32 robots stay in the cache over many steps. New torques every
-        {SUBSTEPS} steps, which go in through Python and a transposition, leave {kept:.0f} % of the speed."""
+    return f"""**Bare equations: limited by arithmetic.** An RK4 step of this robot consists of {operations:,}
+        floating-point operations as written, so {shown(rate)} steps/s are {1e-9 * operations * rate:.0f} billion
+        operations per second on one core, in float64 and strict IEEE order. Blocks of 32 robots stay in the cache over
+        many steps. With new torques every {SUBSTEPS} steps, which pass through Python and a transposition, {kept:.0f} %
+        of the speed is left."""
 
 
 def _environment(measured: Values) -> str:
     share = 100.0 * SUBSTEPS * _over(measured, "env_cores", "bare_cores")
     face = 100.0 * _over(measured, "env_cores", "engine_cores")
-    return f"""**Environments in a batch: what surrounds the integration.** Of a control period {share:.0f} % is
-        integration as fast as that of the bare equations; the rest is observation, reward, report and resets, all of
-        which are written to memory for every robot and step. Gymnasium's face, which checks the actions, copies, and
-        makes the dictionary of infos with its masks, leaves {face:.0f} % of the engine's speed. Half of the substeps
-        make {_over(measured, "env_fewer", "env_cores"):.2f} times as many control periods, where integration alone
+    return f"""**Environments in a batch: limited by what surrounds the integration.** Integration as fast as that of
+        the bare equations takes {share:.0f} % of a control period. The rest is observation, reward, report and resets,
+        which are written to memory for every robot and step. Gymnasium's interface checks the actions, copies, and
+        makes the dictionary of infos with its masks; it leaves {face:.0f} % of the engine's speed. Half as many
+        substeps make {_over(measured, "env_fewer", "env_cores"):.2f} times as many control periods; integration alone
         would make twice as many."""
 
 
 def _alone(value: dict[str, float]) -> str:
     equations = 1e6 * SUBSTEPS / value["bare_one"]
-    return f"""**One robot: calls.** {SUBSTEPS} RK4 steps of one robot take {equations:.1f} µs. With observation, reward
-        and report, and the call from Python into compiled code, its engine takes {value["one_engine"]:.1f} µs; with
-        checks and the dictionary of infos a step takes {value["one_beneath"]:.1f} µs, and with Gymnasium's wrappers
-        {value["one"]:.1f} µs. A loop over environments pays this for each of them; the native batch does not."""
+    return f"""**One robot: limited by calls.** {SUBSTEPS} RK4 steps of one robot take {equations:.1f} µs. With
+        observation, reward, report, and the call from Python into compiled code, the engine takes
+        {value["one_engine"]:.1f} µs. With checks and the dictionary of infos, a step takes {value["one_beneath"]:.1f}
+        µs, and with Gymnasium's wrappers {value["one"]:.1f} µs. A loop over environments pays this for each of them;
+        the native batch does not."""
 
 
 def _mujoco(rate: float, accuracy: Accuracy) -> str:
-    return f"""**MuJoCo: the contact solver.** A step takes {1e6 / rate:.1f} µs, in which it finds the friction forces
-        of all wheels by iteration, for bodies that might do anything; ours knows that they roll. Its error falls in
-        proportion to its step, so that to be as exact as ours at {1e3 * RK4_STEP:g} ms its step would have to be
-        {shown(middle(accuracy.over))} times smaller than {1e3 * MUJOCO_STEP:g} ms."""
+    return f"""**MuJoCo: limited by the contact solver.** In a step of {1e6 / rate:.1f} µs, the solver iterates for the
+        friction forces of all wheels, of bodies that may move in any way. Our equations know that the wheels roll.
+        MuJoCo's error is proportional to its step: to be as accurate as ours at {1e3 * RK4_STEP:g} ms, its step would
+        have to be {shown(middle(accuracy.over))} times smaller than {1e3 * MUJOCO_STEP:g} ms."""
 
 
 def _growth(measured: Values) -> str:
@@ -117,8 +119,8 @@ def _growth(measured: Values) -> str:
     crowd = max(obstacles)
     slower, crowded = casters[few] / casters[many], obstacles[0] / obstacles[crowd]
     return f"""**Growth.** Batches of the bare equations {bare}; those of the environment {environment}. With {many}
-        casters instead of {few} a step takes {slower:.1f} times as long. Among {crowd} pillars it takes {crowded:.1f}
-        times as long as among none: a robot looks at them only when it may have come near one."""
+        casters instead of {few}, a step takes {slower:.1f} times as long. Among {crowd} pillars, it takes {crowded:.1f}
+        times as long as without pillars; robots check them only when one may be near."""
 
 
 def _batches(measured: Values, kind: str) -> str:
@@ -132,13 +134,13 @@ def _batches(measured: Values, kind: str) -> str:
 def _torch(measured: Values) -> str:
     bare, alone = _over(measured, "torch", "bare"), _over(measured, "torch_env_core", "env")
     whole, scaling = _over(measured, "torch_env", "env_cores"), _over(measured, "torch_env", "torch_env_core")
-    text = f"""**Torch: memory.** Each step is one fused kernel that reads and writes every state, where Numba keeps a
-        block in the cache over many steps; in return it works in float32, has gradients and runs on GPUs. On a core it
-        makes {bare:.2f} times the bare steps of Numba and {alone:.2f} times the control periods, on two cores
-        {whole:.2f} times: a second core makes it {scaling:.2f} times as fast, since its threads meet after each kernel,
-        and beside another busy process one thread is the better choice."""
+    text = f"""**Torch: limited by memory.** Each step is one fused kernel that reads and writes every state, whereas
+        Numba keeps a block in the cache over many steps. In return, Torch works in float32, has gradients and runs on
+        GPUs. On one core it makes {bare:.2f} times as many bare steps as Numba and {alone:.2f} times as many control
+        periods, on two cores {whole:.2f} times as many. A second core makes it {scaling:.2f} times as fast, because its
+        threads wait for each other after each kernel. Beside another busy process, one thread is the better choice."""
     if measured.get("cuda"):
         bare, whole = _over(measured, "cuda", "bare_cores"), _over(measured, "cuda_env", "env_cores")
-        text += f""" The GPU makes {bare:.1f} times the bare steps of both cores, and {whole:.1f} times the control
-        periods."""
+        text += f""" The GPU makes {bare:.1f} times as many bare steps as both cores, and {whole:.1f} times as many
+        control periods."""
     return text

@@ -51,11 +51,11 @@ RATIOS = (
         SUBSTEPS,
         at_least(0.6),
     ),
-    Ratio("the same with 2 substeps a period", "env_fewer", "bare_cores", 2.0, at_least(0.6)),
+    Ratio("the same with 2 substeps per period", "env_fewer", "bare_cores", 2.0, at_least(0.6)),
     Ratio("one environment over Pendulum-v1: time of a step", "one", "pendulum", 1.0, at_most(1.0)),
     Ratio("one environment over CartPole-v1: time of a step", "one", "cartpole"),
     Ratio("HalfCheetah-v5 over one environment: time of a step", "cheetah", "one"),
-    Ratio("one environment over its step beneath Gymnasium's wrappers: time", "one", "one_beneath"),
+    Ratio("one environment over the same without Gymnasium's wrappers: time", "one", "one_beneath"),
     Ratio("native batch over SyncVectorEnv of the same: steps", "env_small", "sync_ours"),
     Ratio("native batch over DummyVecEnv of the same, both in SB3: steps", "sb3_small", "dummy_ours"),
     Ratio("two cores over one, bare", "bare_cores", "bare"),
@@ -63,7 +63,7 @@ RATIOS = (
     Ratio("MuJoCo's `rollout` over `mj_step`", "mujoco_threads", "mujoco"),
     Ratio("bare among 8 obstacles over none", "bare_among", "bare", 1.0, at_least(0.5)),
     Ratio("following among 6 obstacles over none", "follow_among", "follow"),
-    Ratio("environment over its engine alone, two cores", "env_cores", "engine_cores"),
+    Ratio("environment over its engine, two cores", "env_cores", "engine_cores"),
     Ratio("Torch over Numba, bare, 1 core", "torch", "bare"),
     Ratio("Torch over Numba, environment, 1 core", "torch_env_core", "env"),
     Ratio("Torch over Numba, environment, two cores", "torch_env", "env_cores"),
@@ -96,11 +96,12 @@ def page(
     parts = [
         "# Speed",
         paragraph(
-            f"""Ours and its peers, measured side by side in one run: {occasion.turns} short turns of all rows, in an
-            order drawn anew for each, so that a busy moment of the machine hits all of them alike. Ratios are taken
-            turn by turn. Every number is the median over the turns, with the middle half of the turns beside it. A
-            "step" is a step of that row's own kind: an RK4 step of {1e3 * RK4_STEP:g} ms, a control period of
-            {1e3 * PERIOD:g} ms of an environment, a MuJoCo step of {1e3 * MUJOCO_STEP:g} ms."""
+            f"""This page says how fast caster_gym runs, beside MuJoCo, Gymnasium's own environments, and loops over
+            environments. All rows were measured in one run, in {occasion.turns} short turns. Each turn measures the
+            rows in a new random order, so that a busy moment of the machine affects all of them alike. Ratios are
+            computed turn by turn. Each number is the median over the turns; the "middle half" is the range between the
+            quartiles. A "step" is an RK4 step of {1e3 * RK4_STEP:g} ms for the bare equations, a control period of
+            {1e3 * PERIOD:g} ms for an environment, and a step of {1e3 * MUJOCO_STEP:g} ms for MuJoCo."""
         ),
         "## Goals",
         goals_table([row for _, _, rows in sections for row in rows], measured, accuracy),
@@ -111,14 +112,14 @@ def page(
     parts += [
         "## Ratios",
         ratios_table(measured),
-        "## Errors beside the speeds",
+        "## Errors at these steps",
         accuracy_text(accuracy, robot),
         "## Growth",
         f"![Speed over the number of robots, casters and obstacles]({folder}/growth.png)",
         paragraph(
-            """*Left: steps per second of whole batches; a batch of a few robots costs what a block of 32 does. Middle
-            and right: time of one robot's step on a core, over its casters and over the pillars in its field. Bars: the
-            middle half of the turns.*"""
+            """*Left: steps per second of whole batches. A batch of a few robots costs as much as a block of 32. Middle
+            and right: time of one robot's step on one core, over the number of its casters and over the number of
+            pillars. Bars: the middle half of the turns.*"""
         ),
         growth_table(measured),
         "## What limits each engine",
@@ -186,11 +187,11 @@ def accuracy_text(accuracy: Accuracy, robot: str) -> str:
         for name, errors in sides.items()
     ]
     over, slips = accuracy.over, 100.0 * middle(accuracy.slips)
-    text = f"""{robot} is driven from rest for {DURATION:g} s, {len(over)} times, each joint pushing the floor with up
-        to {100.0 * STRONG:.0f} % of the weight on its wheel. The error is the distance from where RK4 at a tiny step
-        ends. Drive by drive MuJoCo's is {shown(middle(over))} times ours at {1e3 * RK4_STEP:g} ms, and at least
-        {shown(float(over.min()))} times; its wheels slip by {slips:.2f} % of their way. That its limit is ours as its
-        step goes to zero is shown in [mujoco.md](truth/mujoco.md)."""
+    text = f"""{robot} is driven from rest for {DURATION:g} s, {len(over)} times. Each joint pushes the floor with up to
+        {100.0 * STRONG:.0f} % of the weight on its wheel. The error is the distance from the end that RK4 reaches with
+        a tiny step. MuJoCo's error is {shown(middle(over))} times ours at {1e3 * RK4_STEP:g} ms (median over the
+        drives), and at least {shown(float(over.min()))} times; its wheels slip by {slips:.2f} % of the distance that
+        they roll. As its step goes to zero, its result converges to ours ([mujoco.md](truth/mujoco.md))."""
     heads = ("position after the drive", "median error", "middle half", "greatest")
     return f"{paragraph(text)}\n\n{markdown_table(heads, lines)}"
 
@@ -200,12 +201,12 @@ def origin(occasion: Occasion, folder: str) -> str:
     return "\n".join(
         [
             f"- Command: `{occasion.command}`",
-            *(["- A quick look, without Torch, memory and compiling from nothing"] if occasion.quick else []),
-            f"- {occasion.turns} turns of {occasion.seconds:g} s a row, at least one call; all values: "
+            *(["- A quick measurement, without Torch, memory and compiling from scratch"] if occasion.quick else []),
+            f"- {occasion.turns} turns of {occasion.seconds:g} s per row, at least one call; all values: "
             f"[turns.csv]({folder}/turns.csv)",
             f"- Machine: {processor()}, {os.cpu_count()} cores, of which {occasion.cores} are used",
             f"- Load of the machine: {occasion.loads[0]:.1f} at the start, {occasion.loads[1]:.1f} at the end "
-            "(of an idle one 0 at the start; at the end it is that of the measurement)",
+            "(0 at the start if nothing else runs; the load at the end comes from the measurement)",
             f"- Versions: {versions_in_words(*LIBRARIES)}",
         ]
     )

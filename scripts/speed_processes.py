@@ -88,13 +88,13 @@ def cold_start(robot: str) -> float:
 
 def start_rows(robot: str, cold: bool) -> list[Row]:
     """Start-up; compiling from nothing only if asked for, and once."""
-    again = "fresh process to its first step, compiled before"
+    again = "fresh process until its first step, compiled before"
     rows = [
         Row("import", "`import caster_gym`", "s", lambda: fresh(IMPORT, robot), at_most(0.4), 5),
         Row("first", again, "s", lambda: fresh(FIRST_STEP, robot), at_most(1.0), 5),
     ]
     if cold:
-        name = "fresh process to its first step, nothing compiled yet; it says so"
+        name = "fresh process until its first step, nothing compiled yet"
         rows.append(Row("cold", name, "s", lambda: cold_start(robot), at_most(20.0), 1))
     return rows
 
@@ -103,7 +103,7 @@ def memory_rows(robot: str) -> list[Row]:
     """Memory per robot of a big batch."""
     kinds = (
         ("environment", "environment", at_most(2000.0)),
-        ("engine", "its engine alone", at_most(2000.0)),
+        ("engine", "engine alone", at_most(2000.0)),
         ("fleet", "bare equations", None),
     )
     ways = (("resident", "growth of the process", RESIDENT), ("allocated", "Python's and NumPy's own count", ALLOCATED))
@@ -111,7 +111,7 @@ def memory_rows(robot: str) -> list[Row]:
         Row(
             f"{way}_{kind}",
             f"{title}, batch of {BIG:,}, {how}",
-            "bytes a robot",
+            "bytes per robot",
             partial(fresh, code, robot, kind),
             goal,
             1,

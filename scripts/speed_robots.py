@@ -216,7 +216,7 @@ def environment_rows(robot: str, cores: int, seconds: float) -> list[Row]:
         ),
         Row(
             "engine_cores",
-            f"its engine alone, batch of 4,096, {cores} cores",
+            f"engine alone, batch of 4,096, {cores} cores",
             RATE,
             on(cores, engine(robot, 4096), seconds),
         ),
@@ -242,10 +242,10 @@ def single_rows(robot: str, seconds: float) -> list[Row]:
         Row("one", "one environment, `gym.make`", "µs", each(single(robot, True), seconds)),
         Row(
             "one_beneath",
-            "one environment, beneath Gymnasium's wrappers",
+            "one environment, without Gymnasium's wrappers",
             "µs",
             each(single(robot, False), seconds),
             at_most(5.0),
         ),
-        Row("one_engine", "one environment, its engine alone", "µs", each(single_engine(robot), seconds)),
+        Row("one_engine", "one environment, engine alone", "µs", each(single_engine(robot), seconds)),
     ]

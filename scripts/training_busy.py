@@ -86,10 +86,10 @@ def section(beside: Beside) -> str:
         )
         for threads in COUNTS
     ]
-    text = f"""Training takes one thread unless `--threads` says otherwise. Here PPO trains beside {processes}, so that
+    text = f"""Training uses one thread unless `--threads` says otherwise. Here PPO trains beside {processes}, so that
         one core is left to it, in {len(beside.of(one, "seconds"))} pairs of rounds. With two threads it takes
-        {shown(ratios["seconds"])} times as long by the clock and {shown(ratios["processor"])} times as much of the
-        processor, since the two wait for each other; and other numbers come out, since sums depend on how they are
-        shared out."""
+        {shown(ratios["seconds"])} times as long by the clock and {shown(ratios["processor"])} times as much processor
+        time, because the two wait for each other. The results differ, too, because sums depend on how they are divided
+        among the threads."""
     heads = ("threads", "training with PPO, by the clock", "processor time for a control period")
     return "\n\n".join(["## Beside other processes", paragraph(text), markdown_table(heads, rows)])

@@ -103,13 +103,13 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
     parts = ["# Training speed", paragraph(_compared(results, goal))]
     if results.courses:
         parts += [
-            f"## Until {goal}",
+            f"## Time to {goal}",
             paragraph(_verdict(results, occasion.goal)),
             f"![Validation error over processor time and over control periods]({folder}/learning.png)",
             paragraph(
-                """*Each line is a seed, each circle the validation that first meets the goal without a failure. A
-                robot that leaves its corridor counts with its error until then, so that errors of some 0.1 m are
-                those of policies that still fail.*"""
+                """*Each line is a seed. A circle marks the first validation that meets the goal without a failure. If a
+                robot leaves its corridor, its error until then counts; errors of about 0.1 m are those of policies that
+                still fail.*"""
             ),
             markdown_table(HEADS, _rows(results, occasion.goal)),
             *(_compilation(name, one, results, occasion.goal) for name, one in results.costs.items()),
@@ -118,9 +118,9 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
         parts += [
             "## On test paths",
             paragraph(
-                """The best policy of each seed on the paths of the benchmark: random ones that it has never seen, and
-                shapes unlike any that it was trained on. Validation, on random paths alone, does not tell of
-                those."""
+                """The table shows the best policy of each seed on the test paths of the benchmark: random paths that it
+                has never seen, and shapes unlike any that it was trained on. Validation uses random paths only and says
+                nothing about such shapes."""
             ),
             markdown_table(
                 ("learner", "paths", "failed episodes", "position RMSE of the others, median"), _trials(results)
@@ -134,14 +134,15 @@ def page(results: Results, occasion: Occasion, folder: str) -> str:
 
 def _compared(results: Results, goal: str) -> str:
     """What the page is about."""
-    text = f"""How long a learner takes to follow validation paths with a position RMSE of {goal}: 64 random paths on
-        which nothing is ever trained, always from the same starts, and not one failure. All runs took place in one
-        command, one after the other, on one core, with the settings that `caster-gym train` takes by default."""
+    text = f"""This page says how long a learner trains until its policy follows the validation paths with a position
+        RMSE of {goal} and without a failure. These are 64 random paths that are never used for training, always from
+        the same starts. All runs took place in one command, one after the other, on one core, with the default settings
+        of `caster-gym train`."""
     if "ppo" in results.agents:
-        text += " `ppo` is Stable-Baselines3's PPO on the native batch: it learns from rewards alone."
+        text += " `ppo` is Stable-Baselines3's PPO on the native batch; it learns from rewards alone."
     if "shac" in results.agents:
-        text += """ `shac` passes the gradient of the rewards back through the simulator itself, over short windows, on
-            robots that are Torch tensors."""
+        text += """ `shac` differentiates the rewards through the simulator, over short windows, on robots that are
+            Torch tensors."""
     return text
 
 
@@ -208,8 +209,9 @@ def _verdict(results: Results, goal: float) -> str:
     for name in others:
         periods = _ratio(met[name], met[first], "steps", ("fewer", "more"))
         seconds = _ratio(met[name], met[first], "seconds", ("less", "more"))
-        text.append(f"`{name}` needs {periods} control periods than `{first}` and {seconds} time of the processor.")
-    text.append("These are ratios of medians over the seeds, which the table has in bold, with least and greatest.")
+        text.append(f"`{name}` needs {periods} control periods than `{first}` and {seconds} processor time.")
+    text.append("These are ratios of medians over the seeds.")
+    text.append("The table shows the medians in bold, with minimum and maximum in brackets.")
     return " ".join(text)
 
 
@@ -220,13 +222,13 @@ def _ratio(ours: Sequence[Point], theirs: Sequence[Point], what: str, words: tup
 
 def _compilation(name: str, costs: WindowCosts, results: Results, goal: float) -> str:
     """What compiling adds for whoever trains for the first time."""
-    text = f"""Compiling is the price of `{name}`: on a machine that has never done so, Torch takes
-        {costs.compiling:.0f} s of the processor until the first window is over. Later runs find the code on disk and
-        take {costs.fetching:.1f} s for the same, which the times above include."""
+    text = f"""`{name}` has to be compiled. On a machine that has never done so, Torch takes {costs.compiling:.0f} s of
+        processor time until the first window is over. Later runs find the code on disk and take {costs.fetching:.1f} s
+        for the same, which the times above include."""
     firsts = _firsts(results, goal).get(name)
     if firsts:
         whole = middle(one.seconds for one in firsts) + costs.compiling - costs.fetching
-        text += f" The very first run thus takes {whole:.0f} s to the goal."
+        text += f" The very first run therefore reaches the goal after {whole:.0f} s."
     return paragraph(text)
 
 
@@ -238,9 +240,8 @@ def _limits(results: Results) -> str:
     reached = "reached" if SHARE.goal and SHARE.goal.reached(middle(share)) else "**missed**"
     parts = [
         paragraph(
-            f"""PPO is limited by its own update. On robots that cost nothing, which answer with arrays of the same
-            shapes drawn beforehand, it would hardly be faster; the goal, {SHARE.goal} % of that speed, is
-            {reached}."""
+            f"""PPO is limited by its own update. Robots that cost nothing, which only return arrays drawn beforehand,
+            would hardly make it faster; the goal, {SHARE.goal} % of that speed, is {reached}."""
         ),
         markdown_table(("training with PPO", "median", "middle half"), rows),
     ]
@@ -254,19 +255,19 @@ def _limits(results: Results) -> str:
         }
         parts += [
             paragraph(
-                f"""`{name}` is limited by how many kernels it launches: batches this small hardly keep one busy. A
-                window of {costs.periods:,} control periods takes, in milliseconds of the processor:"""
+                f"""`{name}` is limited by the number of kernels that it launches: batches this small hardly keep a
+                kernel busy. A window of {costs.periods:,} control periods takes, in milliseconds of processor time:"""
             ),
             markdown_table(
                 (name, "ms", "share"),
                 [(what, f"{1e3 * one:.1f}", f"{100.0 * one / whole:.0f} %") for what, one in pieces.items()],
             ),
             paragraph(
-                f"""That is {1e6 * whole / costs.periods:.0f} µs a control period, of which it makes {costs.substeps}
-                RK4 steps, as few as the robot's casters allow; policies are validated on the task's own. What makes
-                up for a dear period is what its gradient tells: PPO only learns whether an action was better than
-                another, SHAC which way to change it. Before each window it starts some robots anew, so that starts,
-                which are hardest, are seen often; PPO starts them when their episodes end."""
+                f"""That is {1e6 * whole / costs.periods:.0f} µs per control period. Each period is {costs.substeps} RK4
+                steps, as few as the robot's casters allow; validation uses the task's own number. The gradient makes up
+                for the cost of a period: PPO only learns whether an action was better than another, whereas SHAC learns
+                in which direction to change it. Before each window, SHAC starts some robots anew, so that it often sees
+                starts, which are hardest. PPO starts robots anew when their episodes end."""
             ),
         ]
     for name, (settings, rate) in results.rates.items():
@@ -286,16 +287,16 @@ def _origin(results: Results, occasion: Occasion, folder: str) -> str:
     told = " and ".join(f"{name} {every}" for name, every in often.items())
     lines = [
         f"- Command: `{occasion.command}`",
-        "- Times are seconds of the processor, so that other work on the machine hardly counts, unless said otherwise; "
+        "- Times are processor time unless the page says otherwise, so that other work on the machine hardly counts; "
         "one thread",
-        "- A run's time begins before its robots and networks are made and ends with the validation that first meets "
-        "the goal, validations left out",
+        "- A run's time begins before its robots and networks are made and ends with the first validation that meets "
+        "the goal; validations themselves do not count",
     ]
     if results.agents:
-        lines.append(f"- Policies are validated often ({told} control periods): times are rounded up to the next one")
+        lines.append(f"- Policies are validated often ({told} control periods); times are rounded up to the next one")
     lines += [
         f"- PPO's speed: {occasion.turns} turns of one round each, collecting and updating, on both kinds of robots in "
-        "an order drawn anew",
+        "a new random order",
         f"- All validations: [validations.csv]({folder}/validations.csv)",
         f"- Machine: {processor()}, {os.cpu_count()} cores, of which one is used",
         f"- Load of the machine: {occasion.loads[0]:.1f} at the start, {occasion.loads[1]:.1f} at the end",

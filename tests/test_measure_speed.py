@@ -97,10 +97,10 @@ def test_what_limits_the_engines_is_told_of_torch_and_a_gpu_where_they_are(accur
     fast = {key: [8.0, 2.0] for key in f"{ours} mujoco torch torch_env torch_env_core env cuda cuda_env".split()}
     measured = {**GROWTH, **fast, "bare_periods": [4.0, 1.0], "env_cores": [1.0, 0.25]}
     text = " ".join(limits_text(measured, accuracy, 4000).split())
-    assert "leave 50 % of the speed" in text
-    assert "Of a control period 50 % is" in text
-    assert "makes 1.00 times the bare steps of Numba" in text
-    assert "a second core makes it 1.00 times as fast" in text
+    assert "50 % of the speed is left" in text
+    assert "takes 50 % of a control period" in text
+    assert "makes 1.00 times as many bare steps as Numba" in text
+    assert "A second core makes it 1.00 times as fast" in text
     assert "The GPU makes 1.0 times" in text
     without = limits_text({**measured, "torch": [], "cuda": []}, accuracy, 4000)
     assert "Torch" not in without

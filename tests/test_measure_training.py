@@ -118,7 +118,7 @@ def test_a_section_tells_what_a_second_thread_costs():
     ]
     text = " ".join(section(Beside(rounds, periods=1000, processes=1)).split())
     assert "beside 1 busy process, so that one core is left to it, in 3 pairs of rounds" in text
-    assert "takes 4 times as long by the clock and 20 times as much of the processor" in text
+    assert "takes 4 times as long by the clock and 20 times as much processor time" in text
     assert "| 1 | 500 steps/s | 1,000 µs |" in text
     assert "| 2 | 125 steps/s | 20,000 µs |" in text
 
@@ -155,20 +155,20 @@ SHAC = [Course("shac", seed, (point(20_000, 6.0, 0.02), point(100_000, 10.0 + se
 
 def test_a_page_tells_who_is_faster_and_by_how_much():
     text = told(*PPO, *SHAC)
-    assert "`shac` needs 4 times fewer control periods than `ppo` and 2.73 times less time of the processor" in text
+    assert "`shac` needs 4 times fewer control periods than `ppo` and 2.73 times less processor time" in text
     assert "| shac | 1 | 100,000 | 11.0 s | 2.00 mm, after 11 s of 11 s |" in text
     assert "| **shac** | 3 of 3 seeds | **100,000** (100,000 – 100,000) | **11.0** (10.0 – 12.0) s | **2.00** (" in text
-    assert "takes 50 s of the processor until the first window is over" in text
-    assert "The very first run thus takes 57 s to the goal." in text  # 11 + 50 − 4
+    assert "takes 50 s of processor time until the first window is over" in text
+    assert "The very first run therefore reaches the goal after 57 s." in text  # 11 + 50 − 4
     assert "| backward: the gradient through all of these | 10.0 | 25 % |" in text
-    assert "39 µs a control period" in text  # 40 ms over 1,024
+    assert "39 µs per control period" in text  # 40 ms over 1,024
     assert "trains at 12,300 steps/s" in text
 
 
 def test_a_page_tells_what_was_lost():
     slow = [Course("shac", seed, (point(800_000, 60.0 + seed, 0.0049),)) for seed in (0, 1, 2)]
     text = told(*PPO, *slow)
-    assert "`shac` needs 2 times more control periods than `ppo` and 2.03 times more time of the processor" in text
+    assert "`shac` needs 2 times more control periods than `ppo` and 2.03 times more processor time" in text
     never = Course("shac", 0, (point(800_000, 60.0, 0.001, failures=2),))
     text = told(*PPO, never)
     assert "`shac` does not reach the goal with every seed." in text

@@ -58,7 +58,7 @@ def section(name="curve", tag="E3"):
 def test_page_holds_verdicts_tables_and_figures(tmp_path):
     page = write_page("paper", "A paper", "Somebody, 2001.", [section()], tmp_path)
     assert "1 of 2 printed numbers and statements agree; 1 differs, for 1 reason (E3)." in page
-    assert "stand apart; 1 of 1 hold." in page
+    assert "are counted separately; 1 of 1 hold." in page
     assert "Checks of our own:\n\n| what | expected | found | verdict | remark |" in page
     assert page.index("| (2) |") < page.index("Checks of our own:") < page.index("| by hand | 0.5 | 0.5 | pass |")
     assert "| (2) | always | sometimes | **fail** | E3: not when it rains |" in page
@@ -131,11 +131,11 @@ def test_differences_are_parted_by_what_the_scan_may_have_done(tmp_path):
     sections = [of_nature("E3", "print"), of_nature("E2", "scan, possibly"), of_nature("E1", "reading")]
     write_page("chung2008", "", "", sections, tmp_path / "chung2008")
     page = differences_page(tmp_path, ("chung2008",))
-    assert page.index("scanned text") < page.index("## What the print must have wrong (1)") < page.index("| E3 |")
-    assert page.index("| E3 |") < page.index("## What the scan may have garbled (1)") < page.index("| E2 |")
+    assert page.index("scanned text") < page.index("## Errors of the print (1)") < page.index("| E3 |")
+    assert page.index("| E3 |") < page.index("## Possible errors of the scan (1)") < page.index("| E2 |")
     assert "| possibly |" in page
     assert page.index("| E2 |") < page.index("## What depends on the reading (1)") < page.index("| E1 |")
-    assert page.index("| E1 |") < page.index("## Repaired without counting")
+    assert page.index("| E1 |") < page.index("## Repairs that do not count")
 
 
 def test_a_page_counts_each_reason_once_and_readings_apart(tmp_path):
