@@ -72,13 +72,12 @@ def test_a_batch_equals_single_environments(task):
     assert_a_batch_equals_single_environments(task, 6, floor=ISLANDS, corridor=0.04, start_offset=0.02)
 
 
-@pytest.mark.parametrize(("task", "floor"), [("track", "grip"), ("follow", ISLANDS)])
+@pytest.mark.parametrize(
+    ("task", "floor"),
+    [("track", "grip"), ("follow", ISLANDS), pytest.param("track", ISLANDS, marks=pytest.mark.slow)],
+)
 def test_a_batch_equals_single_environments_among_obstacles(task, floor):
-    """Thrown at walls and pillars: impacts, in which wheels slip on a floor of finite friction, and lasting contacts.
-
-    Both tasks are compared on such a floor above and among obstacles here. One of them is compared with both at once,
-    which takes longest to compile.
-    """
+    """Thrown at walls and pillars: impacts, in which wheels slip where friction is finite, and lasting contacts."""
     hits = assert_a_batch_equals_single_environments(task, 4, 20, 1.5, floor=floor, arena=OBSTACLES, corridor=0.6)
     assert hits >= 1
 

@@ -6,13 +6,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-import torch
 from gymnasium.wrappers import TimeLimit
 from numpy.testing import assert_allclose, assert_array_equal
 
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.starts import check_motion
-from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 from caster_gym.robot import load_robot
 from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
@@ -145,23 +143,6 @@ def test_a_batch_starts_as_its_single_environments(place):
             for name in ("pose", "reference_pose", "progress", "clearance", "traction_use", "conditioning"):
                 assert_array_equal(infos[name][robot], info[name], name)
             assert_array_equal(steps[0][robot], single.step(action)[0])
-
-
-@pytest.mark.parametrize("place", list(KINDS))
-def test_torch_starts_as_numba(place):
-    """In double precision, up to the rounding of observations to float32 and of Torch's cosines."""
-    task = "track" if place == "time" else "follow"
-    ours = TorchVectorEnv(task, COUNT, dtype=torch.float64, **POOL)
-    theirs = KINDS[place][1](COUNT, autoreset_mode="SameStep", **POOL)
-    for options in every_option(place):
-        mine, other = ours.reset(seed=SEED, options=options), theirs.reset(seed=SEED, options=options)
-        assert_allclose(mine[0], other[0], rtol=0.0, atol=1e-6)
-        assert_allclose(mine[1]["progress"], other[1]["progress"], rtol=0.0, atol=1e-12)
-        action = np.full((COUNT, 6), 0.3, dtype=np.float32)
-        assert_allclose(ours.step(torch.as_tensor(action))[0], theirs.step(action)[0], rtol=0.0, atol=1e-6)
-    for options, message in (({"pose": [9.0, 0.0, 0.0]}, "outside the corridor"), ({place: 99.0}, "must lie in 0")):
-        with pytest.raises(ValueError, match=message):
-            ours.reset(options=options)
 
 
 @pytest.mark.parametrize("place", list(KINDS))

@@ -1,11 +1,8 @@
 """caster_gym.envs.tensor.task: one control period as a function of tensors."""
 
-import math
-
 import pytest
 import torch
 
-from caster_gym.envs.report import REPORT
 from caster_gym.envs.tensor.task import TorchTask
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
@@ -41,31 +38,11 @@ def test_only_chosen_robots_start_again(task):
     assert torch.equal(seen.rewards, outcome.rewards)
 
 
-def test_a_wrench_pushes_the_robot():
-    """1 N forward for a control period of 20 ms: Δv = F h / M, M between platform and all bodies, 5 and 9 kg."""
-    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
-    state, _ = task.begin(torch.arange(1))
-    moved, _ = task.step(state, torch.zeros((1, 6)), torch.tensor([[1.0, 0.0, 0.0]]))
-    speed = math.hypot(moved.bodies[4].item(), moved.bodies[5].item())
-    assert 0.02 / 9.0 < speed < 0.02 / 5.0
-
-
 def test_a_wrench_of_another_shape_is_refused():
     task = TorchTask("track", path=CIRCLE)
     state, _ = task.begin(torch.arange(2))
     with pytest.raises(ValueError, match=r"wrench must have shape \(2, 3\), got \(3,\)"):
         task.step(state, torch.zeros((2, 6)), torch.ones(3))
-
-
-def test_what_is_seen_at_a_start_depends_on_the_robots_own_numbers():
-    """Its casters' trails scale their observed rates, and more."""
-    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
-    trail = torch.full((2,), 0.02, dtype=torch.float64, requires_grad=True)
-    casters = tuple(caster._replace(trail=trail) for caster in task.parameters.casters)
-    task.parameters = task.parameters._replace(casters=casters)
-    _, outcome = task.begin(torch.arange(2))
-    (slope,) = torch.autograd.grad(outcome.report[REPORT.deviation.conditioning].sum(), trail)
-    assert (slope != 0.0).all()
 
 
 @pytest.mark.slow

@@ -137,13 +137,6 @@ def test_results_are_new_tensors_at_each_call():
     assert second.data_ptr() != first.data_ptr()
 
 
-def test_resets_without_a_seed_go_on_with_the_sequence_of_episodes():
-    theirs, ours = both("track", 4)
-    for seed in (3, None, None):
-        assert_allclose(ours.reset(seed=seed)[0], theirs.reset(seed=seed)[0], rtol=1e-6, atol=1e-6)
-    assert_allclose(ours.reset(path=1)[0], theirs.reset(options={"path": 1})[0], rtol=1e-6, atol=1e-6)
-
-
 def test_an_action_that_is_no_number_ends_its_robots_episode_alone():
     ours = TorchVectorEnv("track", 3, path=PATHS)
     ours.reset(seed=1)
@@ -183,14 +176,3 @@ def test_bad_input_is_refused():
         ours.set_robots([load_robot("chung2008"), random_robot(1, 4)])
     with pytest.raises(ValueError, match=r"rows must have shape \(2, 100\), got \(2, 94\)"):
         ours.set_parameters(torch.zeros((2, 94)))
-
-
-def test_without_diagnostics_everything_else_is_the_same():
-    whole, lean = (TorchVectorEnv("track", 8, path="lemniscate", diagnostics=given) for given in (True, False))
-    whole.reset(seed=0), lean.reset(seed=0)
-    for actions in random_actions(8, 6, 20):
-        *ours, infos = whole.step(torch.as_tensor(actions))
-        *theirs, fewer = lean.step(torch.as_tensor(actions))
-        assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
-    assert set(infos) - set(fewer) == {"traction_use", "wheels_lifted", "conditioning"}
-    assert all(torch.equal(infos[name], fewer[name]) for name in ("position_error", "progress", "power"))

@@ -21,7 +21,7 @@ WORKING_ROWS = 100  # numbers a robot that a step keeps at least, beside the rob
 
 
 def _sqrt(x: Tensor) -> Tensor:
-    """√x whose derivative at 0 is 0, not infinite: what is chosen away must not turn a gradient into NaN."""
+    """√x whose derivative at 0 is 1, not infinite: what is chosen away must not turn a gradient into NaN."""
     none = x == 0.0
     return torch.where(none, x, torch.sqrt(torch.where(none, 1.0, x)))
 
@@ -41,7 +41,9 @@ def checked_device(device: torch.device | str) -> torch.device:
     try:
         place = torch.device(device)
         torch.empty(0, device=place)
-    except (RuntimeError, AssertionError, NotImplementedError) as error:
+    # Torch raises a RuntimeError for an unknown name or number, and one of the others, depending on the kind of device,
+    # where it was built without that kind
+    except (RuntimeError, AssertionError, NotImplementedError, ImportError) as error:
         reason = str(error).splitlines()[0]
         raise ValueError(
             f"device must be one that Torch finds on this machine, got {str(device)!r}: {reason}"

@@ -1,4 +1,6 @@
-"""Tasks on a floor of finite friction, on tensors: the episodes of the compiled batch, with gradients."""
+"""caster_gym.envs.tensor.drive: a control period of motion; on a floor of finite friction, with gradients."""
+
+import math
 
 import numpy as np
 import pytest
@@ -12,14 +14,34 @@ from tests.test_envs_tensor_vector_env import assert_same_episodes, both, random
 CIRCLE = {"shape": "circle", "radius": 0.5}
 
 
+def test_a_wrench_pushes_the_robot():
+    """1 N forward for a control period of 20 ms: Δv = F h / M, M between platform and all bodies, 5 and 9 kg."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64)
+    state, _ = task.begin(torch.arange(1))
+    moved, _ = task.step(state, torch.zeros((1, 6)), torch.tensor([[1.0, 0.0, 0.0]]))
+    speed = math.hypot(moved.bodies[4].item(), moved.bodies[5].item())
+    assert 0.02 / 9.0 < speed < 0.02 / 5.0
+
+
+@pytest.mark.parametrize("floor", ["grip", ISLANDS])
+def test_substeps_one_by_one_are_all_of_them_at_once(floor):
+    """To the last bit: one by one where a gradient is wanted, so that the compiler has less to look at."""
+    task = TorchTask("track", path=CIRCLE, fields={"floor": floor}, dtype=torch.float64)
+    state, _ = task.begin(torch.arange(3))
+    actions = torch.full((3, 6), 0.3)
+    at_once, _ = task.step(state, actions)
+    one_by_one, _ = task.step(state._replace(bodies=state.bodies.clone().requires_grad_()), actions)
+    assert torch.equal(one_by_one.bodies, at_once.bodies)
+
+
 @pytest.mark.parametrize("task", ["track", "follow"])
-def test_episodes_are_those_of_the_compiled_batch(task):
+def test_episodes_on_islands_of_ice_are_those_of_the_compiled_batch(task):
     failures, ends, _ = assert_same_episodes(*both(task, 9, corridor=0.09, floor=ISLANDS), 100)
     assert failures + ends >= 3
 
 
 @pytest.mark.slow
-def test_episodes_among_obstacles_are_those_of_the_compiled_batch():
+def test_episodes_among_obstacles_on_a_slippery_floor_are_those_of_the_compiled_batch():
     """Pillars and walls beside two paths: impacts in which wheels slip, and lasting contacts."""
     floor = {"friction": 0.4}
     *_, impacts = assert_same_episodes(*both("follow", 4, arena=OBSTACLES, corridor=0.6, floor=floor), 8, 1.5)
@@ -62,7 +84,7 @@ def test_gradients_pass_and_are_those_of_differences(dtype):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
-def test_each_part_is_one_graph_for_the_compiler(part):
+def test_each_part_is_one_graph_for_the_compiler_on_every_floor(part):
     task = TorchTask("track", path=CIRCLE, fields={"floor": ISLANDS}, dtype=torch.float64)
     state, _ = task.begin(torch.arange(3))
     actions = torch.full((3, 6), 0.3)
