@@ -7,7 +7,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 LOWEST := .venv-lowest
 LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_splines paths_specification \
-  paths_trajectory export_mjcf engines_numba engines_native_cores engines_native_compilation \
+  paths_trajectory export_mjcf engines_native_fleet engines_native_cores engines_native_compilation \
   engines_native_compiled_files tasks_track_environment agents_comparison_task_settings \
   agents_learning_bundle report_run_folder wrappers_specification
 

@@ -1,4 +1,4 @@
-"""caster_gym.agents.usual_names: names of other libraries get advice that names what there is, and that helps."""
+"""agents.learning.usual_names: names of other libraries get advice that names what there is, and that helps."""
 
 import inspect
 import re

@@ -1,6 +1,8 @@
-"""Rooms are closed: who imports what from where."""
+"""Rooms are closed: who imports what from where; and whatever text names a module names one that is there."""
 
 import ast
+import pkgutil
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -55,6 +57,43 @@ def test_rooms_below_the_agents_do_not_import_them(room):
 def test_what_is_installed_imports_nothing_that_is_not():
     for name, file in modules("caster_gym", "agents").items():
         assert not {one.split(".")[0] for one in imported(file)} & {"papers", "scripts", "tests"}, name
+
+
+ALL = modules("caster_gym", "agents", "papers", "scripts", "tests")
+MADE_UP = ("caster_gym.tasks.mine", "configs/tasks/mine.yaml", "tests/test_tasks_mine.py")  # by who follows a recipe
+DOTTED = re.compile(r"(?<![\w.])(?:caster_gym|papers|scripts|tests)(?:\.[A-Za-z]\w*)+(?!\.?\w)")
+TOPS = "caster_gym|agents|papers|scripts|tests|configs|docs"
+SLASHED = re.compile(rf"(?<![\w/.])(?:{TOPS})/[\w/.-]*\.(?:py|yaml|md|csv)\b")
+
+
+def exists(name: str, folder: Path = ROOT) -> bool:
+    """Whether there is such a file, for a page in a folder, or such a module or name in one."""
+    if "/" in name:
+        return (ROOT / name).is_file() or (folder / name).is_file()
+    try:
+        return name in ALL or pkgutil.resolve_name(name) is not None
+    except (ImportError, AttributeError):
+        return False
+
+
+def test_names_that_are_gone_are_told_from_others():
+    assert all(map(exists, ("caster_gym.robot.Robot.joints", "caster_gym.mechanics", "docs/step.md")))
+    assert not any(map(exists, ("caster_gym.robot.Root", "caster_gym.robots", "caster_gym/robots.py")))
+
+
+@pytest.mark.parametrize("pattern", [DOTTED, SLASHED], ids=["modules", "files"])
+def test_what_comments_and_pages_name_is_there(pattern):
+    """Of tests, which may name what is wrong, their first lines."""
+    texts = [*ALL.values(), *ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("configs/**/*.yaml")]
+    named: dict[str, Path] = {}
+    for file in texts:
+        text = file.read_text(encoding="utf-8")
+        named |= dict.fromkeys(
+            pattern.findall(text.partition("\n")[0] if file.is_relative_to(ROOT / "tests") else text), file
+        )
+    assert len(named) > 50
+    gone = {name: str(file) for name, file in named.items() if name not in MADE_UP and not exists(name, file.parent)}
+    assert gone == {}
 
 
 def test_types_are_checked_strictly_wherever_there_is_code():

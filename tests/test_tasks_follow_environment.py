@@ -17,7 +17,7 @@ from caster_gym.engines.native.lanes import LANES
 from caster_gym.envs.observation import observation_size
 from caster_gym.tasks.follow.environment import CasterFollowEnv, CasterFollowVectorEnv
 from caster_gym.tasks.follow.parameters import FollowParameters
-from tests.test_envs_vector import assert_same, random_actions
+from tests.test_envs_caster_vector_env import assert_same, random_actions
 
 ID = "caster_gym:CasterFollow-v0"
 CIRCLE = {"shape": "circle", "radius": 0.4}

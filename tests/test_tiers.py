@@ -1,4 +1,4 @@
-"""The tiers of tests: what `make quick` and `make lowest` run is there."""
+"""The tests themselves: files are named after what they test, and what `make quick` and `make lowest` run is there."""
 
 import ast
 import re
@@ -8,6 +8,27 @@ import pytest
 
 TESTS = Path(__file__).parent
 FILES = sorted(file.name for file in TESTS.glob("test_*.py"))
+TOPS = ("caster_gym", "agents", "scripts")
+WHOLE = "api cheats messages packaging rooms tiers written_once"  # laws of the package
+SHARED = {  # what the modules of a folder do together
+    "agents_commands": "train",
+    "analysis": "page",
+    "engines": "gradients obstacles slip",
+    "envs": "floor floor_use",
+    "mechanics": "engines page published",
+}
+
+
+def test_each_file_is_named_after_what_it_tests():
+    """The path of a module or of a folder; perhaps with a subject, of a module or of those shared ones, behind it."""
+    files = [file.relative_to(TESTS.parent) for top in TOPS for file in (TESTS.parent / top).rglob("*.py")]
+    modules = {re.sub("^(caster_gym|scripts)_", "", "_".join(file.with_suffix("").parts)) for file in files}
+    folders = {name.removesuffix("___init__") for name in modules}  # and modules
+    subjects = {f"{folder}_{subject}" for folder, listed in SHARED.items() for subject in listed.split()}
+    names = {name.removeprefix("test_").removesuffix(".py") for name in FILES}
+    others = names - folders - subjects - set(WHOLE.split())
+    assert not {name for name in others if not name.startswith(("docs_", *(f"{module}_" for module in modules)))}
+    assert subjects <= names  # what is no longer there is not listed
 
 
 def is_slow(decorator):

@@ -1,4 +1,4 @@
-"""caster_gym.tasks.track.environment: the native batch equals Gymnasium's SyncVectorEnv of single environments."""
+"""caster_gym.envs.caster_vector_env: the native batch equals Gymnasium's SyncVectorEnv of single environments."""
 
 import copy
 from typing import Any

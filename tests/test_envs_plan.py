@@ -1,4 +1,4 @@
-"""What the environments tell of their paths."""
+"""caster_gym.envs.plan: what the environments tell of their paths, and where these lead."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""caster_gym.engines.native.compiler, .lanes and .numba_fleet: the mechanics compiled, and in batches."""
+"""caster_gym.engines.native.fleet, .compiler, .lanes: the mechanics compiled, and in batches."""
 
 import numpy as np
 import pytest
