@@ -63,7 +63,7 @@ class Comparison(NamedTuple):
 
 
 def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | None = None) -> Comparison:
-    """Read all files that a comparison names. changes: fields of learned agents to set, such as {"n_timesteps": 10000}."""
+    """Read all files that a comparison names. changes: fields to set of agents that learn, as {"n_timesteps": 1000}."""
     agents: dict[str, AgentSettings] = {}
     for name in settings.agents:
         stem = Path(name).stem

@@ -17,8 +17,6 @@ from caster_gym.mechanics.parameters import (
 from caster_gym.mechanics.scalars import register
 from caster_gym.robot import Robot
 
-WORKING_ROWS = 100  # numbers a robot that a step keeps at least, beside the robot's own: states, observations, reports
-
 
 def _sqrt(x: Tensor) -> Tensor:
     """√x whose derivative at 0 is 1, not infinite: what is chosen away must not turn a gradient into NaN."""
