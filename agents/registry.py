@@ -1,4 +1,4 @@
-"""All agents by the `algorithm` that their YAML files name: ours by a name, yours as `module:Name`.
+"""All agents by the `algorithm` that their YAML files name: ours by a name, your own as `module:Name`.
 
 Only a file that the user names on the command line, or in a comparison, may bring code of its own: nothing that lies in
 a folder of results is read here.

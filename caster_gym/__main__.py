@@ -1,4 +1,4 @@
-"""The command caster-gym, also as `python -m caster_gym`: it needs more than simulation does."""
+"""The command caster-gym, also as `python -m caster_gym`; it needs the training dependencies."""
 
 import sys
 from importlib import import_module

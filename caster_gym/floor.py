@@ -1,4 +1,4 @@
-"""The floor as it is written in YAML and in Python: one that wheels may slip on. Points are in W."""
+"""A floor of finite friction, as it is written in YAML and Python. Points are in W."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, TypeAlias

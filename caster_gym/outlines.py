@@ -1,4 +1,4 @@
-"""Outlines of convex shapes: their faces and corners, and what is wrong with one that is no such shape."""
+"""Outlines of convex shapes, by faces and corners, and checks that a shape is convex."""
 
 from cmath import isfinite
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Code of your own that settings name as `module:Name`.
+"""Imports user code that settings name as `module:Name`.
 
 A module is looked for beside the file that names it, in the working folder, and among the installed packages. Importing
 it runs its code, so that no file in a folder of results, which may come from a stranger, brings any.

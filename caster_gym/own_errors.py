@@ -1,4 +1,4 @@
-"""Code of users that runs here: what it raises is told in a sentence, with the file and the line."""
+"""Reports errors of user code in a sentence, with the file and the line."""
 
 import sys
 import traceback

@@ -1,4 +1,4 @@
-"""Numbers of a robot that can hardly be meant: millimetres for metres, grams for kilograms, an inertia of nothing.
+"""Warnings about implausible numbers of a robot: millimetres for metres, grams for kilograms, tiny inertias.
 
 Bounds are wide: they let pass what is merely unusual. Nothing is refused, since a robot may be as odd as one likes.
 """

@@ -1,4 +1,4 @@
-"""A robot on powered casters: what it is made of, checked, with units. SI throughout; B is the body frame."""
+"""The description of a robot on powered casters, checked and with units. SI throughout; B is the body frame."""
 
 import os
 from collections.abc import Mapping

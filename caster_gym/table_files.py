@@ -1,4 +1,4 @@
-"""Files of tables as people have them.
+"""Reads files of tables in the forms that programs write them.
 
 The columns may be separated by commas, semicolons, tabs or blanks. A line that begins with #, % or // is a comment; the
 last one before the numbers may be the header. A unit stands behind the name of its column, as in `x [mm]`, `x (mm)` or

@@ -1,4 +1,4 @@
-"""Tables whose columns are found by their names, in whatever units they are: the same for paths and recordings."""
+"""Tables whose columns are found by name, in any units; for paths and recordings alike."""
 
 import math
 import re

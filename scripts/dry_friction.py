@@ -1,4 +1,4 @@
-"""How far a robot creeps under a load that dry friction ought to hold, here and in MuJoCo.
+"""Creep of a robot under a load that dry friction should hold, here and in MuJoCo.
 
 MuJoCo's dry friction is a constraint that holds a joint; ours passes smoothly through zero within `coulomb_speed`, so
 that a joint below its breakaway turns slowly. All casters trail, and each rolling joint is driven by a share of its

@@ -1,4 +1,4 @@
-"""Impacts that the floor cannot hold, here and in MuJoCo: python -m scripts.impact_peer --out docs/truth
+"""Impacts that exceed the floor's friction, compared with MuJoCo: python -m scripts.impact_peer --out docs/truth
 
 A robot runs head-on into a smooth wall. Here its wheels keep rolling without slip, whatever the floor must give for it;
 MuJoCo's wheels slip where the friction of its floor does not suffice.

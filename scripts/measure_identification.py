@@ -1,4 +1,4 @@
-"""How often the intervals of `caster-gym identify` hold the truth, with the model's own friction and with others.
+"""How often the intervals of `caster-gym identify` contain the truth, with the model's friction and with others.
 
     python -m scripts.measure_identification --recordings 200 --out docs/identification
 

@@ -1,4 +1,4 @@
-"""What programs that read MJCF take of an exported robot: `python -m scripts.measure_readers --out docs/export.md`.
+"""What MJCF readers take from an exported robot: `python -m scripts.measure_readers --out docs/export.md`.
 
 Each reader is installed in an environment of its own in a temporary folder, with pinned versions, and asked by its
 probe in scripts/readers. The table between the markers of the page is replaced.

@@ -1,4 +1,4 @@
-"""How fast the robots run, beside MuJoCo and Gymnasium's own: python -m scripts.measure_speed --out docs/speed.md
+"""Speed of the robots, beside MuJoCo and Gymnasium: python -m scripts.measure_speed --out docs/speed.md
 
 About ten minutes, and more where nothing has been compiled yet; with --quick about one, then without Torch, memory and
 compiling from nothing.

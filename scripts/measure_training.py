@@ -1,4 +1,4 @@
-"""How fast policies are trained: python -m scripts.measure_training --out docs/training.md
+"""Speed of training: python -m scripts.measure_training --out docs/training.md
 
 First, what simulation costs PPO: control periods per second of training on our robots and on robots that cost nothing,
 which answer with arrays of the same shapes drawn beforehand; turn by turn, so that a busy moment hits both. Then, how

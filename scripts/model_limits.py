@@ -1,4 +1,4 @@
-"""What the model leaves out, and how large it is on each robot: python -m scripts.model_limits --out docs/truth.md
+"""What the model leaves out, and how large each effect is: python -m scripts.model_limits --out docs/truth.md
 
 Every number follows from the equations themselves: how much of the floor's friction is asked for, how far from lifting
 the wheels are, how far motions part when a term is left out. How well the equations hold where their assumptions do is

@@ -1,4 +1,4 @@
-"""Our motions beside MuJoCo's, somebody else's code: python -m scripts.mujoco_peer --out docs/truth
+"""Motions compared with MuJoCo's: python -m scripts.mujoco_peer --out docs/truth
 
 The same torques drive the same robots here and, with ever smaller time steps, in MuJoCo. The command writes a page, a
 table and a figure.

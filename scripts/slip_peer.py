@@ -1,4 +1,4 @@
-"""A floor that wheels slip on, here and in MuJoCo: python -m scripts.slip_peer --out docs/truth
+"""Slip on a floor of finite friction, compared with MuJoCo: python -m scripts.slip_peer --out docs/truth
 
 The same robots on the same floor: driven until their wheels slip, driven beyond what the floor holds, with one wheel
 that spins, with wheels that slide and find their grip again, and braked by wheels that hardly turn. MuJoCo's elliptic

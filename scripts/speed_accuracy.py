@@ -1,4 +1,4 @@
-"""How far off the motions are at the steps whose speed is measured: ours and MuJoCo's, driven strongly for 4 s."""
+"""Errors of the motions at the steps whose speed is measured: ours and MuJoCo's, driven strongly for 4 s."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What limits each engine, told with the numbers that were measured."""
+"""What limits each engine, in words, with the numbers that were measured."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""The measurements as a page, with the goals that they reach and miss."""
+"""The page of `scripts.measure_speed`, with the goals that are reached and missed."""
 
 import os
 import platform

@@ -1,4 +1,4 @@
-"""What ours is measured beside: MuJoCo with the same robot, Gymnasium's own environments, loops over environments."""
+"""Peers: MuJoCo with the same robot, Gymnasium's own environments, loops over environments."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""What needs a process of its own: start-up, compiling from nothing, memory."""
+"""Measurements that need a process of their own: start-up, compiling from scratch, memory."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What of ours is measured: the bare equations, whole environments in batches, and one robot alone."""
+"""Measurements of our robots: the bare equations, whole environments in batches, and one robot alone."""
 
 from collections.abc import Callable
 from typing import Any

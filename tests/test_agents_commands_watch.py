@@ -184,7 +184,7 @@ def test_a_person_drives_where_the_keys_say(setup, window, monkeypatch):
     [
         ({"save": None}, "there is no display to open a window on; give --save run.mp4 or --save run.gif"),
         ({"agent": "keyboard"}, "there is no display to open a window on"),
-        ({"save": "run.avi"}, r"a film must be saved as \.mp4 or \.gif, got 'run.avi'"),
+        ({"save": "run.avi"}, r"a video must be saved as \.mp4 or \.gif, got 'run.avi'"),
         ({"robots": 0}, "robots must be 1 … 16, got 0"),
         ({"agent": "keyboard", "robots": 2}, "robots must be 1 with the keyboard, got 2"),
         ({"seconds": 0.0}, "seconds must be positive and finite, got 0.0"),

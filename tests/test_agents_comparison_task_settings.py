@@ -1,4 +1,4 @@
-"""agents.comparison.task_settings: YAML is checked, paths tested on are never trained on, errors say what would do."""
+"""agents.comparison.task_settings: YAML is checked, paths tested on are never trained on, errors say what suffices."""
 
 from importlib.resources import files
 from pathlib import Path

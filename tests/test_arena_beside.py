@@ -128,7 +128,9 @@ def test_where_there_is_no_room_the_path_is_named_and_so_many_as_are_told_fit(as
     """A room that fits the path closely has little left."""
     low, high = PATHS[0][:, :2].min(0) - 0.3, PATHS[0][:, :2].max(0) + 0.3
     crowded = {"room": [low.tolist(), high.tolist()], "beside": asked}
-    with pytest.raises(ValueError, match=r"pillars and \d+ walls do not fit beside path 'eight'; .* would do") as error:
+    with pytest.raises(
+        ValueError, match=r"pillars and \d+ walls do not fit beside path 'eight'; .* would suffice"
+    ) as error:
         draw_beside(read_arena(crowded), HULLS["chung2008"], PATHS[0], 0, "eight")
     pillars, walls = map(int, re.findall(r"'pillars' of (\d+) and 'walls' of (\d+)", str(error.value))[0])
     fewer = read_arena({**crowded, "beside": {**asked, "pillars": pillars, "walls": walls}})

@@ -274,7 +274,7 @@ def test_casters_that_differ_are_refused():
 @pytest.mark.slow
 def test_motors_that_are_too_slow_for_every_design_are_refused():
     target = DesignTarget(**{**LIMITS, **BOUNDS, "objective": "use", "speed": 20.0})
-    with pytest.raises(ValueError, match=r"no design within the bounds reaches the target.* would do") as error:
+    with pytest.raises(ValueError, match=r"no design within the bounds reaches the target.* would suffice") as error:
         optimise(ROBOT, target)
     factor = float(re.findall(r"motors (\S+) times as fast", str(error.value))[0])
     content = ROBOT.model_dump()

@@ -56,7 +56,9 @@ def test_the_tasks_steps_follow_the_robots_that_come_with_the_package(name):
 
 def test_a_step_that_throws_light_wheels_beyond_their_top_speed_is_refused_with_one_that_does_not():
     light = rows(load_robot("chung2008"), with_wheels(load_robot("chung2008"), 1e-6))
-    with pytest.raises(ValueError, match=r"caster 1 to its top speed in 0.0005 s.*'substeps' of 80 would do") as told:
+    with pytest.raises(
+        ValueError, match=r"caster 1 to its top speed in 0.0005 s.*'substeps' of 80 would suffice"
+    ) as told:
         check_free_wheels("these", light, 0.005, 4)
     assert "at most 0.00025 s" in str(told.value)
     check_free_wheels("these", light, 0.02 / 80, 80)

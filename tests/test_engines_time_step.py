@@ -197,7 +197,7 @@ def test_the_number_of_substeps_that_a_refusal_names_would_do(case):
     robot = STIFF[case]
     with pytest.raises(ValueError, match="'substeps' of") as caught:
         CasterTrackEnv(robot, PATH)
-    count = int(re.findall(r"'substeps' of (\d+) would do, in place of 4", str(caught.value))[0])
+    count = int(re.findall(r"'substeps' of (\d+) would suffice, in place of 4", str(caught.value))[0])
     with pytest.raises(ValueError, match="cannot follow"):
         CasterTrackEnv(robot, PATH, substeps=count - 1)
     greatest = []
@@ -284,7 +284,7 @@ def test_features_that_could_make_a_robot_stiff_are_refused_with_substeps_that_d
 
     with pytest.raises(ValueError, match="features may make them") as caught:
         made()
-    env = made(substeps=int(re.findall(r"'substeps' of (\d+) would do", str(caught.value))[0]))
+    env = made(substeps=int(re.findall(r"'substeps' of (\d+) would suffice", str(caught.value))[0]))
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(200):

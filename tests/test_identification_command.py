@@ -87,7 +87,7 @@ def test_the_files_hold_the_numbers_of_the_identification(found, short, settings
         rows = list(csv.DictReader(file))
     assert [row["name"] for row in rows] == list(NAMES)
     for row, value, half, one in zip(rows, found.estimates, found.half_widths, found.unknowns, strict=True):
-        assert (float(row["estimate"]), float(row["start"]), row["told"]) == (value, one.start, "True")
+        assert (float(row["estimate"]), float(row["start"]), row["determined"]) == (value, one.start, "True")
         assert float(row["high"]) - float(row["low"]) == pytest.approx(2.0 * half)
         assert f"| {one.name} | {one.start:.6g} | {number_words(value, half)} | {one.unit} |" in text
     for one in found.agreements:
@@ -154,12 +154,12 @@ def test_what_is_not_told_is_said_and_has_no_interval(short, tmp_path):
     found = identify(robot, read_recording(still, robot), PAYLOAD[:1])
     write_identification(found, still, read_identify("chung2008", PAYLOAD[:1]), tmp_path)
     text = (tmp_path / "identified.md").read_text(encoding="utf-8")
-    assert "| payload_mass | 0.5 | not told | kg |" in text
-    assert "**The recording does not tell payload_mass.**" in text
-    assert in_words(found) == "The recording does not tell payload_mass."
+    assert "| payload_mass | 0.5 | not determined | kg |" in text
+    assert "**The recording does not determine payload_mass.**" in text
+    assert in_words(found) == "The recording does not determine payload_mass."
     with (tmp_path / "identified.csv").open(encoding="utf-8") as file:
         (row,) = csv.DictReader(file)
-    assert (row["told"], row["low"], row["high"]) == ("False", "", "")
+    assert (row["determined"], row["low"], row["high"]) == ("False", "", "")
 
 
 @pytest.mark.parametrize(

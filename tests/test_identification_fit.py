@@ -144,7 +144,7 @@ def test_what_is_hardly_told_apart_is_named_with_its_correlation():
     correlation = found.correlations[0, 1]
     assert correlation > 0.98
     (note,) = found.notes
-    assert note.startswith("payload_mass and roll_strength are hardly told apart")
+    assert note.startswith("payload_mass and roll_strength can hardly be separated")
     assert f"a correlation of {correlation:+.3f}," in note
 
 
@@ -196,7 +196,7 @@ def still(count=60):
 def test_a_robot_that_stands_still_tells_nothing(recording):
     names = (*LOAD, "scrub")
     found = identify(CHUNG, recording, names)
-    assert sorted(found.untold) == sorted(f"The recording does not tell {name}." for name in names)
+    assert sorted(found.untold) == sorted(f"The recording does not determine {name}." for name in names)
     assert not found.is_told.any()
     assert_allclose(found.estimates, [one.start for one in found.unknowns], atol=1e-3)  # where they started
     assert found.warnings == ()
@@ -214,7 +214,7 @@ def test_straight_motion_tells_the_mass_and_how_far_aside_it_is_but_not_how_far_
     recording = Recording(0.02, states[:, :3], states[:, 6:], torque, states[:, 3:6])
     found = identify(CHUNG, noisy(recording, 0) if with_noise else recording, (*truth, "scrub"))
     assert_array_equal(found.is_told, [True, False, True, False])
-    assert set(found.untold) == {"The recording does not tell payload_x.", "The recording does not tell scrub."}
+    assert set(found.untold) == {f"The recording does not determine {name}." for name in ("payload_x", "scrub")}
     reached = np.abs(found.estimates - [*truth.values(), 0.0])[[0, 2]]
     assert (reached <= np.maximum(2.0 * found.half_widths[[0, 2]], 1e-6)).all()
 

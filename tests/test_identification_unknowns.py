@@ -98,9 +98,9 @@ def test_starts_are_the_files_numbers_unless_given():
         (("motor_lag",), {}, {"motor_lag": (-0.1, 0.1)}, "lower bound of motor_lag must not be negative"),
         (("radius_5",), {}, {}, "has 4 casters, from radius_1 to radius_4"),
         (("radius", "radius_2"), {}, {}, "'radius' is one number that all casters share and 'radius_2'"),
-        (("floor_friction",), {}, {}, "no recording tells 'floor_friction': wheels that roll without slip"),
-        (("position_bias",), {}, {}, "no recording tells 'position_bias'"),
-        (("pushes",), {}, {}, "no recording tells 'pushes'"),
+        (("floor_friction",), {}, {}, "no recording determines 'floor_friction': wheels that roll without slip"),
+        (("position_bias",), {}, {}, "no recording determines 'position_bias'"),
+        (("pushes",), {}, {}, "no recording determines 'pushes'"),
         (("latency",), {}, {}, "did you mean 'torque_delay'"),
         (("wheel_radius",), {}, {}, "did you mean 'radius'"),
     ],
@@ -138,7 +138,7 @@ def test_all_that_wrappers_disturb_can_be_asked_for_or_is_explained():
         try:
             unknowns(ROBOT, (name,))
         except ValueError as error:
-            if "no recording tells" in str(error):
+            if "no recording determines" in str(error):
                 continue
             advised = str(error).split("did you mean ")[1].split("'")[1]
             unknowns(ROBOT, (advised,))  # the advice helps

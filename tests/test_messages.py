@@ -27,7 +27,7 @@ OPTIONS = {option for command in COMMANDS.values() for one in command.params for
 STARTS = {"path", "time", "progress", "pose", "twist", "steering", "reset_mask"}  # of reset(options=…)
 OTHERS = {"psi": "a column of angles", "caster_gym": "the package itself"}
 
-# each sentence that says what "would do", by the file that says it, and the test that does it
+# each sentence that says what "would suffice", by the file that says it, and the test that does it
 PROMISES = {
     "caster_gym/design/command.py": [
         "design_sizing::test_motors_of_exactly_the_required_size_drive_the_paths_and_smaller_ones_do_not"
@@ -120,7 +120,7 @@ def test_every_option_and_command_that_a_message_names_exists():
 def test_every_promise_of_what_would_do_has_a_test_that_does_it():
     made: dict[str, int] = {}
     for file, text in sentences():
-        made[file] = made.get(file, 0) + text.count("would do")
+        made[file] = made.get(file, 0) + text.count("would suffice")
     assert {file: count for file, count in made.items() if count} == {one: len(them) for one, them in PROMISES.items()}
     for tests in PROMISES.values():
         for place in tests:

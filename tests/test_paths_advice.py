@@ -58,7 +58,7 @@ TOO_FAST = [
 
 @pytest.mark.parametrize("path", TOO_FAST, ids=str)
 def test_a_trajectory_is_accepted_once_its_message_is_followed(path):
-    with pytest.raises(ValueError, match=r"would do$") as error:
+    with pytest.raises(ValueError, match=r"would suffice$") as error:
         build_trajectories(path, ROBOT, PERIOD)
     assert build_trajectories(changed(path, str(error.value).rsplit(";", 1)[1]), ROBOT, PERIOD)
 
@@ -67,7 +67,7 @@ def test_a_path_of_too_many_steps_is_accepted_once_it_is_as_short_as_its_message
     step = 0.0012345678
     with pytest.raises(ValueError, match="at most") as error:
         read_paths({"shape": "circle", "duration": 1e5})[0].trajectories(step)
-    longest = float(re.findall(r"at most ([\d.]+) s would do", str(error.value))[0])
+    longest = float(re.findall(r"at most ([\d.]+) s would suffice", str(error.value))[0])
     assert read_paths({"shape": "circle", "duration": longest})[0].trajectories(step)
 
 
@@ -108,8 +108,8 @@ def test_a_course_is_made_once_its_message_is_followed(path):
             as_it_is = sentence == "CasterTrack drives it as it is, in the time of its 'duration'"
             assert build_trajectories(path if as_it_is else changed(path, sentence), ROBOT, PERIOD)
             continue
-        assert sentence.endswith(" would do")
-        for way in sentence.removesuffix(" would do").split(" or "):
+        assert sentence.endswith(" would suffice")
+        for way in sentence.removesuffix(" would suffice").split(" or "):
             free = way == "a free heading"
             assert build_courses(path if free else changed(path, way), ROBOT, 1.0, free_heading=free)
 
@@ -118,7 +118,7 @@ def test_a_course_is_made_once_its_message_is_followed(path):
     "path", [{"shape": "circle", "radius": 0.03}, {"shape": "circle", "radius": 0.01}, turning(30)]
 )
 def test_a_spacing_that_was_asked_for_is_replaced_by_one_that_does(path):
-    with pytest.raises(ValueError, match=r"a spacing of .* would do$") as error:
+    with pytest.raises(ValueError, match=r"a spacing of .* would suffice$") as error:
         build_courses(path, ROBOT, 1.0, spacing=0.02)
     spacing = float(re.findall(r"a spacing of ([\d.e-]+) m", str(error.value))[0])
     assert build_courses(path, ROBOT, 1.0, spacing=spacing)
@@ -127,7 +127,7 @@ def test_a_spacing_that_was_asked_for_is_replaced_by_one_that_does(path):
 @pytest.mark.parametrize(
     ("path", "pattern", "field"),
     [
-        (spline((0, 0), (1.2345678, 0), tolerance=1.0), r"at most ([\d.]+) m would do", "tolerance"),
+        (spline((0, 0), (1.2345678, 0), tolerance=1.0), r"at most ([\d.]+) m would suffice", "tolerance"),
         ({"shape": "rounded_square", "side": 1.23456789, "rounding": 1.0}, r"half the side, ([\d.]+) m", "rounding"),
         ({"shape": "random_paths", "min_radius": 0.1}, r"needs reversing ([\d.]+),", "reversing"),
     ],

@@ -180,7 +180,7 @@ def test_a_turn_within_a_row_is_refused_and_the_spacing_offered_does():
 
 def test_a_heading_that_turns_within_a_row_is_refused_unless_it_is_free():
     dizzy = {"shape": "circle", "heading": {"kind": "spinning", "turns": 30}}
-    with pytest.raises(ValueError, match=r"its heading turns by .* a spacing of 0\.01\d? m would do"):
+    with pytest.raises(ValueError, match=r"its heading turns by .* a spacing of 0\.01\d? m would suffice"):
         lines(dizzy)
     assert lines(dizzy, free_heading=True)
 

@@ -148,7 +148,7 @@ def test_a_path_that_a_time_step_slows_down_is_judged_as_it_is_written():
     (circle,) = read_paths({"shape": "circle", "duration": 8.685})
     rounded = motor_use(circle.trajectories(0.1), tidybot).use[0]
     assert rounded <= 1.0
-    with pytest.raises(ValueError, match="would do"):
+    with pytest.raises(ValueError, match="would suffice"):
         check_feasible(circle, circle.trajectories(0.1), tidybot)
 
 
@@ -156,9 +156,9 @@ def test_a_path_that_a_time_step_slows_down_is_judged_as_it_is_written():
 @pytest.mark.parametrize("shape", ["circle", "ellipse", "rounded_square"])
 def test_advice_holds_at_other_time_steps_too(shape, time_step):
     tidybot = load_robot("tidybot2")
-    with pytest.raises(ValueError, match="would do") as error:
+    with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories({"shape": shape, "duration": 4.0}, tidybot, 0.02)
-    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would suffice", str(error.value))[0])
     exact = time_step * np.ceil(duration / time_step)  # a coarse step may shorten it, by half of itself
     assert build_trajectories({"shape": shape, "duration": exact}, tidybot, time_step)
 
@@ -211,17 +211,17 @@ def test_a_geared_motor_of_the_same_power_has_the_same_use():
 
 @pytest.mark.parametrize("shape", ["circle", "rounded_square"])
 def test_the_duration_that_an_error_offers_does_and_a_tenth_less_does_not(shape):
-    with pytest.raises(ValueError, match="would do") as error:
+    with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories({"shape": shape, "duration": 2.0}, ROBOT, 0.02)
-    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would suffice", str(error.value))[0])
     assert build_trajectories({"shape": shape, "duration": duration}, ROBOT, 0.02)
-    with pytest.raises(ValueError, match="would do"):
+    with pytest.raises(ValueError, match="would suffice"):
         build_trajectories({"shape": shape, "duration": 0.9 * duration}, ROBOT, 0.02)
 
 
 def test_the_limits_that_an_error_offers_for_random_paths_do():
     wild = {"shape": "random_paths", "count": 20, "duration": 5.0, "max_acceleration": 20.0, "max_speed": 5.0}
-    with pytest.raises(ValueError, match=r"path 'random_paths \d+' .* would do") as error:
+    with pytest.raises(ValueError, match=r"path 'random_paths \d+' .* would suffice") as error:
         build_trajectories(wild, ROBOT, 0.02)
     offered = dict(re.findall(r"(max_\w+) ([\d.]+)", str(error.value)))
     assert set(offered) == {"max_speed", "max_acceleration", "max_yaw_rate"}
@@ -258,11 +258,11 @@ def test_friction_beyond_the_motors_cannot_be_helped_by_going_slower():
 
 
 def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they_take():
-    """A hundred times the duration would do, and nothing at all for what lies beyond a million time steps."""
+    """A hundred times the duration would suffice, and nothing at all for what lies beyond a million time steps."""
     path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
-    with pytest.raises(ValueError, match="would do") as error:
+    with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories(path, ROBOT, 0.1)
-    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would suffice", str(error.value))[0])
     assert build_trajectories({**path, "duration": duration}, ROBOT, 0.1)
     with pytest.raises(ValueError, match="takes more time steps than a path may have"):
         build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 6e4}, ROBOT, 0.1)
@@ -271,9 +271,9 @@ def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they
 @pytest.mark.parametrize("path", [{"shape": "circle"}, {"shape": "spline", "waypoints": [[0, 0, 0], [2, 1, 1]]}])
 def test_viscous_friction_falls_with_speed_and_the_slow_path_that_is_offered_is_driven(path):
     sticky = robot_with(roll={"max_torque": 0.2, "max_speed": 100.0, "viscous": 0.5})
-    with pytest.raises(ValueError, match="would do") as error:
+    with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories(path, sticky, 0.02)
-    duration = float(re.findall(r"a duration of at least ([\d.]+) s would do", str(error.value))[0])
+    duration = float(re.findall(r"a duration of at least ([\d.]+) s would suffice", str(error.value))[0])
     assert build_trajectories({**path, "duration": duration}, sticky, 0.02)
 
 

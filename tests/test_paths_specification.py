@@ -100,7 +100,7 @@ def test_every_trajectory_has_a_name_of_its_own():
 def test_errors_of_building_name_the_path():
     with pytest.raises(ValueError, match=r"path 'circle': a duration of 0\.1 s is 5 time steps"):
         build_trajectories({"shape": "circle", "duration": 0.1}, ROBOT, 0.02)
-    with pytest.raises(ValueError, match=r"path 'circle' .* a duration of at least .* would do"):
+    with pytest.raises(ValueError, match=r"path 'circle' .* a duration of at least .* would suffice"):
         build_trajectories({"shape": "circle", "duration": 1.0}, ROBOT, 0.02)
 
 

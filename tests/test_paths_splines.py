@@ -100,7 +100,7 @@ def test_a_tolerance_beyond_a_tenth_of_the_extent_is_refused_and_the_offered_one
     waypoints = ((0.0, 0.0), (1.23, 0.0), (1.23, 0.7), (0.0, 0.7))
     with pytest.raises(ValidationError, match=r"tolerance of 2 m is more than a tenth of the 1\.23 m") as error:
         Spline(waypoints=waypoints, closed=True, tolerance=2.0)
-    offered = float(re.findall(r"at most ([\d.]+) m would do", str(error.value))[0])
+    offered = float(re.findall(r"at most ([\d.]+) m would suffice", str(error.value))[0])
     assert len(samples(Spline(waypoints=waypoints, closed=True, tolerance=offered))) == 501
 
 

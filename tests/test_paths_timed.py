@@ -129,12 +129,12 @@ def test_a_log_that_starts_at_rest_and_is_rounded_is_driven(digits):
 
 def test_what_the_motors_cannot_do_is_refused_and_the_stretch_offered_does():
     path = {"shape": "timed", "poses": [[0, 0, 0, 0], [1, 2, 0, 0]]}
-    with pytest.raises(ValueError, match=r"a stretch of at least .* would do") as error:
+    with pytest.raises(ValueError, match=r"a stretch of at least .* would suffice") as error:
         build_trajectories(path, ROBOT, 0.02)
     stretch = float(re.findall(r"stretch of at least ([\d.]+)", str(error.value))[0])
     (trajectory,) = build_trajectories({**path, "stretch": stretch}, ROBOT, 0.02)
     assert trajectory.duration == pytest.approx(stretch, abs=0.02)
-    with pytest.raises(ValueError, match="would do"):
+    with pytest.raises(ValueError, match="would suffice"):
         build_trajectories({**path, "stretch": 0.9 * stretch}, ROBOT, 0.02)
 
 
@@ -251,9 +251,9 @@ def test_too_few_time_steps_are_refused_and_the_stretch_offered_does():
 @pytest.mark.parametrize("lasting", [0.1, 1e-6, 0.0123456])
 def test_a_short_record_is_driven_once_it_is_stretched_as_its_message_says(lasting):
     path = {"shape": "timed", "poses": [[0, 0, 0, 0], [lasting, 1, 0, 0]]}
-    with pytest.raises(ValueError, match="would do") as error:
+    with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories(path, ROBOT, 0.02)
-    (stretch,) = re.findall(r"a stretch of at least (\S+) would do", str(error.value))
+    (stretch,) = re.findall(r"a stretch of at least (\S+) would suffice", str(error.value))
     assert build_trajectories({**path, "stretch": float(stretch)}, ROBOT, 0.02)
 
 

@@ -72,7 +72,7 @@ def test_an_interrupted_film_leaves_nothing(tmp_path, suffix, error):
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_film_without_frames_is_refused(tmp_path, suffix):
-    with pytest.raises(ValueError, match="a film needs at least one frame"), recording(tmp_path / f"a{suffix}", 50.0):
+    with pytest.raises(ValueError, match="a video needs at least one frame"), recording(tmp_path / f"a{suffix}", 50.0):
         pass
     assert list(tmp_path.iterdir()) == []
 
@@ -84,7 +84,7 @@ def test_an_mp4_of_odd_size_is_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["run.avi", "run", "run.png"])
 def test_an_unknown_suffix_is_refused(tmp_path, name):
-    with pytest.raises(ValueError, match=rf"a film must be saved as .mp4 or .gif, got '{name}'"):
+    with pytest.raises(ValueError, match=rf"a video must be saved as .mp4 or .gif, got '{name}'"):
         check_target(tmp_path / name)
 
 

@@ -221,7 +221,7 @@ def test_wheels_that_time_steps_cannot_follow_are_refused():
     with pytest.raises(ValueError, match=r"must leave trails and radii of robot 'tidybot2' positive"):
         batch(WheelErrors(trail=-0.02))
     with pytest.raises(
-        ValueError, match=r"features may make them: with a trail of .* at most .* 'substeps' of 41 would do"
+        ValueError, match=r"features may make them: with a trail of .* at most .* 'substeps' of 41 would suffice"
     ):
         batch(WheelErrors(trail=(-0.013, 0.0)))
     batch(WheelErrors(trail=(-0.013, 0.0)), substeps=41)

@@ -27,7 +27,7 @@ from caster_gym.agents.registry import read_agent
 from caster_gym.report.run_folder import begun, check_file
 from caster_gym.shipped_files import read_settings
 
-AGENTS_THERE = "Folder of a trained policy, name of a model-based agent, or YAML file of a controller of your own"
+AGENTS_THERE = "Folder of a trained policy, name of a model-based agent, or YAML file of your own controller"
 MJCF_SUFFIXES = (".xml", ".mjcf")
 
 app = typer.Typer(
@@ -63,7 +63,7 @@ def train(
     change: Changes = None,
     threads: Threads = 1,
 ) -> None:
-    """Train a policy. The best one on validation paths is saved in OUT/best, which `evaluate` and `watch` read."""
+    """Train a policy. Save the one that is best on the validation paths in OUT/best, for `evaluate` and `watch`."""
     with plain_errors():
         from caster_gym.agents.comparison.metrics import in_words
         from caster_gym.agents.learning.training import train as run
@@ -100,7 +100,7 @@ def evaluate(
     overwrite: Overwrite = False,
     threads: Threads = 1,
 ) -> None:
-    """Evaluate an agent on the test paths of a task, and write a table, all episodes as CSV, and figures."""
+    """Evaluate an agent on the test paths of a task. Write a table, all episodes as CSV, and figures."""
     with plain_errors():
         from caster_gym.agents.commands.evaluate import evaluate as run
 
@@ -117,7 +117,7 @@ def benchmark(
     change: Changes = None,
     threads: Threads = 1,
 ) -> None:
-    """Train the learned agents, evaluate all agents on the same held-out paths, print the table, draw the figures."""
+    """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
     with plain_errors():
         from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
 
@@ -134,21 +134,24 @@ def benchmark(
 def watch(
     agent: Annotated[
         str,
-        typer.Argument(help=f"{AGENTS_THERE}, or keyboard: W, A, S, D or arrows drive, Q and E turn."),
+        typer.Argument(
+            help=f"{AGENTS_THERE}, or `keyboard`: drive with W, A, S, D or the arrow keys, turn with Q and E."
+        ),
     ] = "computed_torque",
     task: TrainedTask = None,
     path: Annotated[
-        str, typer.Option(help="Name or index of a test path; with several robots, that of the first.")
+        str, typer.Option(help="Name or index of a test path; with several robots, of the first robot's path.")
     ] = "0",
     robots: Annotated[int, typer.Option(help="Number of robots, each on its own test path.", min=1, max=16)] = 1,
     seed: Annotated[int, typer.Option(help="Seed of the starts.", min=0, max=2**32 - 1)] = 0,
     save: Annotated[
-        Path | None, typer.Option(help="Write a film instead of opening a window: run.mp4 or run.gif.")
+        Path | None,
+        typer.Option(help="Write a video, such as run.mp4 or run.gif, instead of opening a window."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a film that is there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing video.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after this time [s].")] = None,
 ) -> None:
-    """Show an agent on the test paths of a task, in a window or a film, or drive the robot yourself."""
+    """Show an agent on the test paths of a task, in a window or a video, or drive the robot yourself."""
     with plain_errors():
         from caster_gym.agents.commands.selection import choose_task
         from caster_gym.agents.commands.watch import watch as run
@@ -165,7 +168,7 @@ def watch(
 def design(
     robot: Annotated[
         str | None,
-        typer.Option(help="Name of a robot in configs/robots, or path of a YAML file. Default: that of the target."),
+        typer.Option(help="Name of a robot in configs/robots, or path of a YAML file. Default: the target's robot."),
     ] = None,
     target: Annotated[
         str, typer.Option(help="Name of a target in configs/designs, or path of a YAML file.")
@@ -177,7 +180,7 @@ def design(
         typer.Option("--set", help="Change a setting of the target, e.g. --set speed=1.5. May be repeated."),
     ] = None,
 ) -> None:
-    """Find the wheel radius and the trail that suit a target best, and how strong the motors must be."""
+    """Find the wheel radius and the trail that suit a target best, and the motors that it needs."""
     with plain_errors(NOTHING_WRITTEN):
         from caster_gym.design import design as run
         from caster_gym.design import read_design
@@ -191,19 +194,19 @@ def design(
 @app.command()
 def identify(
     recording: Annotated[
-        Path | None, typer.Argument(help="CSV file of a recording; --example shows the format.")
+        Path | None, typer.Argument(help="CSV file with a recording; --example writes one that shows the format.")
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="The robot as far as it is known: its name, or path of a YAML file.")
+        str, typer.Option(help="The robot as described so far: a name, or path of a YAML file.")
     ] = "chung2008",
     unknown: Annotated[
         list[str] | None,
         typer.Option(
-            help="What to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
+            help="Quantity to identify; may be repeated: payload_mass, payload_x, payload_y, payload_inertia, "
             "roll_viscous, roll_coulomb, steer_viscous, steer_coulomb, scrub, trail, radius, steering_zero, "
             "roll_strength, steer_strength (for all casters; radius_2 for one; radii, trails, steering_zeros for "
-            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Default: mass and place "
-            "of a payload."
+            "each), torque_delay, motor_lag, heading_zero, vx_bias, vy_bias, yaw_rate_bias. Default: mass and "
+            "position of a payload."
         ),
     ] = None,
     example: Annotated[Path | None, typer.Option(help="Write an example recording to this CSV file instead.")] = None,
@@ -237,15 +240,15 @@ def export(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of its YAML file.")],
     mjcf: Annotated[Path, typer.Option(help="File for the robot as a MuJoCo model, such as robot.xml.")],
     time_step: Annotated[
-        float, typer.Option(help="Time step of the model [s]; MuJoCo's slip falls in proportion to it.")
+        float, typer.Option(help="Time step of the model [s]; the slip of its wheels is proportional to it.")
     ] = 2e-3,
     friction: Annotated[
         float,
-        typer.Option(help="Coefficient of friction between wheels and floor [-]; a high one comes closest to rolling."),
+        typer.Option(help="Coefficient of friction between wheels and floor [-]; high values come closest to rolling."),
     ] = 5.0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
 ) -> None:
-    """Write a robot as a MuJoCo model (MJCF), with bodies, joints, gears, motors, and wheels that roll by friction."""
+    """Write a robot as a MuJoCo model (MJCF): bodies, joints, gears, motors, and wheels that roll by friction."""
     with plain_errors():
         from caster_gym.export.mjcf import mjcf as model
         from caster_gym.robot import load_robot
@@ -268,10 +271,10 @@ def warm(
         list[str] | None, typer.Option(help="Name of a task, or path of a YAML file; may be repeated.")
     ] = None,
     casters: Annotated[
-        list[int] | None, typer.Option(help="Number of casters of some other robot; may be repeated.")
+        list[int] | None, typer.Option(help="Number of casters of another robot; may be repeated.")
     ] = None,
 ) -> None:
-    """Compile code for robots and tasks ahead; by default for all that come with the package."""
+    """Compile the code for robots and tasks ahead of time; by default for all that come with the package."""
     with plain_errors("what was compiled is kept; the same command goes on from there"):
         from caster_gym.agents.commands.warm import read_pieces
         from caster_gym.agents.commands.warm import warm as run

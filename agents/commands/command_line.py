@@ -1,4 +1,4 @@
-"""What all commands of caster-gym share: options, settings of the form KEY=VALUE, and errors in one sentence."""
+"""Options that the commands share, settings of the form KEY=VALUE, and errors as one sentence."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,18 +16,20 @@ PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 MOST_THREADS = 1024  # far more make systems refuse memory that is there
 LONGEST_MESSAGE = 1000  # characters
 
-Out = Annotated[Path, typer.Option(help="Folder for the results; it must be empty or not there.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete what is in that folder first.")]
+Out = Annotated[Path, typer.Option(help="Folder for the results. It must be empty or not exist yet.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete the contents of that folder first.")]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Change a setting of the learned agents, as --set n_timesteps=100000. May be repeated."),
+    typer.Option(
+        "--set", help="Change a setting of the learned agents, e.g. --set n_timesteps=100000. May be repeated."
+    ),
 ]
 TaskName = Annotated[str, typer.Option(help="Name of a task in configs/tasks, or path of a YAML file.")]
 TrainedTask = Annotated[
     str | None,
     typer.Option(
-        help="Name of a task in configs/tasks, or path of a YAML file. Default: the task that the policy was trained "
-        "on, else track."
+        help="Name of a task in configs/tasks, or path of a YAML file. Default: the task that the policy was "
+        "trained on, or track."
     ),
 ]
 Threads = Annotated[
@@ -35,7 +37,7 @@ Threads = Annotated[
     typer.Option(
         min=1,
         max=MOST_THREADS,
-        help="Threads of each process, for networks and simulation. Results depend on their number.",
+        help="Threads per process, for networks and simulation. Results depend on this number.",
     ),
 ]
 

@@ -1,4 +1,4 @@
-"""Which agent and which task the words of a command line mean."""
+"""Which agent and which task the arguments of a command mean."""
 
 from pathlib import Path
 from typing import NamedTuple

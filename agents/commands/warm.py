@@ -1,4 +1,4 @@
-"""Compiling ahead: what robots and tasks need goes into the cache, piece by piece, so that nobody waits later."""
+"""The command `warm`: compiles the code for robots and tasks ahead of time, piece by piece."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""To look at an agent, or to drive oneself: in a window, or as a film on disk."""
+"""The command `watch`: shows an agent, or a robot that a person drives, in a window or as a video."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager

@@ -1,4 +1,4 @@
-"""Verdicts in words."""
+"""The verdict on a policy in words."""
 
 from typing import Any
 

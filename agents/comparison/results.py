@@ -1,4 +1,4 @@
-"""Agents on the same episodes, and the folder of results: tables, episodes as CSV, figures."""
+"""Evaluates agents on the same episodes and writes the folder of results: tables, episodes as CSV, figures."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How good agents are on validation paths, on which policies and gains are chosen."""
+"""Evaluates agents on the validation paths, by which policies and gains are chosen."""
 
 import csv
 from collections.abc import Sequence

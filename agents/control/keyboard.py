@@ -1,4 +1,4 @@
-"""A person drives: held keys are a wanted twist, and the exact model finds the torques."""
+"""Drives a robot by keyboard: held keys give the wanted twist, and the exact model finds the torques."""
 
 from collections.abc import Callable, Mapping
 

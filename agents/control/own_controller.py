@@ -1,4 +1,4 @@
-"""Controllers of one's own: what they give is checked, and whatever goes wrong names the agent and the line."""
+"""Checks what user-defined controllers return, and reports errors with the agent and the line."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What every agent is, model-based or learned, and what the settings of a model-based controller say."""
+"""The protocol of agents, model-based or learned, and the settings of model-based controllers."""
 
 import hashlib
 import sys

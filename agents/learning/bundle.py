@@ -1,4 +1,4 @@
-"""A policy on disk: a folder with weights as safetensors and everything else as YAML. Loading it runs no code.
+"""Policies on disk: a folder with weights as safetensors and everything else as YAML. Loading one runs no code.
 
 policy.yaml            what the policy is, for which robot and task, and how it came about
 weights.safetensors    the actor's weights

@@ -1,4 +1,4 @@
-"""PPO by rsl-rl-lib on robots that are tensors: observations, rewards and networks never leave the device."""
+"""PPO by rsl-rl-lib on tensors: observations, rewards and networks never leave the device."""
 
 import contextlib
 import io

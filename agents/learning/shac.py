@@ -1,4 +1,4 @@
-"""Short-horizon actor-critic (Xu et al., 2022): the policy climbs its own return's gradient, through the simulator.
+"""Short-horizon actor-critic (Xu et al., 2022): follows the gradient of the return through the simulator.
 
 The robots run for a short window under the policy. What they earn in it, plus what a critic expects of the states at
 its end, is a smooth function of the policy's weights, and `TorchTask` passes its gradient back through every period.

@@ -1,4 +1,4 @@
-"""A training run, whoever learns: the validations of its policies, and the folder in which they are kept."""
+"""A training run, for any learner: validates policies and keeps them in a folder."""
 
 import time
 from collections.abc import Callable, Mapping

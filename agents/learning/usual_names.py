@@ -1,4 +1,4 @@
-"""What rsl-rl-lib, other libraries and our own older files call what is set here, so that their names get an answer.
+"""Settings under the names of other libraries and of our older files: errors that give the names used here.
 
 The settings bear the names of Stable-Baselines3 and rl_zoo3. Each other name stands for a field, whose value means the
 same, or for words that say where such a thing is set.

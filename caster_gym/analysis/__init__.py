@@ -1,1 +1,1 @@
-"""What can be said of a robot without simulating it."""
+"""Properties of a robot that need no simulation."""

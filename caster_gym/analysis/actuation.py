@@ -1,4 +1,4 @@
-"""Can the driven motors push the robot whatever its casters' angles? Their worst conditioning says so. (A1)
+"""Whether the driven motors can push the robot at any casters' angles: their worst conditioning. (A1)
 
 The equations of motion never become singular, but a set of driven joints can. A driven rolling joint pushes along the
 line through its pivot and its wheel's centre, a driven steering joint along the wheel's axle: where all these lines

@@ -1,4 +1,4 @@
-"""Twists, accelerations and forces of the platform (…, 3) in B and in W: two components in the plane, one about ẑ.
+"""Twists, accelerations and forces of the platform (…, 3) converted between B and W.
 
 A heading is the complex number e^{iβ}, as points of the plane are in `caster_gym.paths`.
 """

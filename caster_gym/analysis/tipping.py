@@ -1,4 +1,4 @@
-"""Does a robot lift wheels when it drives off or brakes at full torque? (G5), (G7) of docs/equations.md say so."""
+"""Whether a robot lifts wheels when it drives off or brakes at full torque; (G5), (G7) of docs/equations.md."""
 
 import warnings
 from functools import lru_cache

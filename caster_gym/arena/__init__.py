@@ -1,4 +1,4 @@
-"""What is in the way: half-planes, walls, pillars and convex polygons on the floor."""
+"""Obstacles: half-planes, walls, pillars and convex polygons on the floor."""
 
 from caster_gym.arena.arena import Arena, read_arena
 from caster_gym.arena.clearance import distances

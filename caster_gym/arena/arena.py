@@ -1,4 +1,4 @@
-"""Obstacles as they are written in YAML and in Python. All points and directions are in W."""
+"""Obstacles as they are written in YAML and Python. All points and directions are in W."""
 
 from collections.abc import Mapping
 from pathlib import Path

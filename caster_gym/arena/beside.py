@@ -1,4 +1,4 @@
-"""Obstacles drawn at random beside a path, so near that a robot that deviates touches them."""
+"""Random obstacles beside a path, near enough that a robot that deviates touches them."""
 
 from typing import NamedTuple
 
@@ -47,7 +47,7 @@ def draw_beside(
         drawn = _drawn(arena, fewer, track, index, start_margin)
     raise ValueError(
         f"{arena.beside.pillars} pillars and {arena.beside.walls} walls do not fit beside path {name!r}; "
-        f"'pillars' of {fewer.pillars} and 'walls' of {fewer.walls} would do"
+        f"'pillars' of {fewer.pillars} and 'walls' of {fewer.walls} would suffice"
     )
 
 

@@ -1,4 +1,4 @@
-"""Is a path free?"""
+"""Whether a path is free of obstacles."""
 
 from collections.abc import Callable
 

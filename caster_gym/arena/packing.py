@@ -1,4 +1,4 @@
-"""Arenas and robots as the tables that the mechanics reads."""
+"""Arenas and robots as the tables of numbers that the mechanics reads."""
 
 from collections.abc import Sequence
 

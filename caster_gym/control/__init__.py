@@ -1,1 +1,1 @@
-"""How to make the robot move as wanted: torques for wrenches."""
+"""Motor torques for wanted wrenches."""

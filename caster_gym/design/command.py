@@ -165,13 +165,13 @@ def page(report: DesignReport) -> str:
         f"{MEANINGS[settings.objective]} {_bound_words(design)}{_speed_words(report)}",
         "![objective over radius and trail; motors asked for and there](design.png)",
         "## Motors",
-        "Greatest torque, speed and power, margin included, of each motor as the robot file counts it. The smallest "
-        "motor is the one of least standstill torque times top speed whose line, falling from that torque to zero at "
-        "that speed, lies above all that is asked. Use is what is asked over what the file's motor has left at its "
-        "speed; 1 is the limit.",
+        "Maximum torque, speed and power of each motor, as the robot file counts them, with the margin. The smallest "
+        "motor has the least product of standstill torque and top speed among those whose line, from that torque at "
+        "rest to zero at that speed, lies above everything that is needed. Use is the needed torque over what the "
+        "file's motor can give at that speed; 1 is the limit.",
         markdown_table(MOTOR_HEADS, map(_motor_row, report.after.motors, report.before.motors)),
         f"{report.after.factor:.2f} times all torques of the file, with the top speeds of the smallest motors, would "
-        "do. The motors share the work with the least sum of squared shares, as paths are checked by; so, without "
+        "suffice. The motors share the work with the least sum of squared shares, as paths are checked by; so, without "
         f"margin, the one that works hardest gives {100 * report.after.share:.0f} % of its standstill torque in the "
         f"envelope. No way of sharing needs less than {100 * report.after.least_share:.0f} %.",
         "`robot.yaml` is the robot with the best radius and trail, and with the motors of the original.",

@@ -1,4 +1,4 @@
-"""What the motions of a target ask of each motor. Derivation: docs/analysis.md, section S.
+"""The torques and speeds that the motions of a target need from each motor. docs/analysis.md, section S.
 
     stage      at rest and while casters flip they stand at any angle; faster, they trail
     share      steering of a caster that stands at any angle, as a share −1 … 1 of π        (N, S) [-]

@@ -1,4 +1,4 @@
-"""Is a set of driven joints never, somewhere or always singular? Exact, for any casters.
+"""Whether a set of driven joints is never, somewhere or always singular: exact, for any casters.
 
 A set is singular at a point P that all its lines of action pass through, or where they are all parallel. What a caster
 can do about it depends only on which of its joints are driven, on its pivot A and on the lengths d (trail) and s:

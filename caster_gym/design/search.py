@@ -1,4 +1,4 @@
-"""The wheel radius and the trail that suit a target best. Derivation: docs/analysis.md, section S.
+"""Search for the wheel radius and the trail that suit a target best. Derivation: docs/analysis.md, section S.
 
 Wheels and links keep their masses and grow in likeness: with the radius the wheel's inertias by its square, with the
 trail the link's inertia by its square and its mass centre in proportion. Pivots, lateral offsets, platform and motors
@@ -268,7 +268,7 @@ def _fast_enough(robot: Robot, target: DesignTarget, region: Region) -> str:
         )
         search = _Search(robot.model_copy(update={"casters": casters}), target, region)
         if np.isfinite(search.costs(np.array(_TYPICAL[1:]))).any():
-            return f"; motors {factor:g} times as fast would do"
+            return f"; motors {factor:g} times as fast would suffice"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""How strong and how fast the motors of a robot must be for a target. Derivation: docs/analysis.md, section S.
+"""The smallest motors of a robot that suffice for a target. Derivation: docs/analysis.md, section S.
 
 A motor's torque falls linearly to zero at its top speed and is whole when it brakes (docs/equations.md, (M3)). With a
 margin k it must lie on or above its line as if every torque and every speed were k times as great.

@@ -1,4 +1,4 @@
-"""What a robot is to be able to do, from which the size of its wheels and motors follows."""
+"""The target of a design: the motions that a robot must be able to make."""
 
 from itertools import combinations
 from typing import Annotated, Literal, Self
@@ -66,7 +66,7 @@ def loaded(robot: Robot, target: Target) -> Robot:
 
 
 def check_actuation(robot: Robot) -> None:
-    """Refuse driven joints that cannot push the robot in every direction at all steering angles: no motor would do.
+    """Refuse driven joints that cannot push the robot in every direction at all steering angles: no motor suffices.
 
     Decided exactly, by the lines of action (docs/analysis.md, L).
     """

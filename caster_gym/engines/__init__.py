@@ -1,1 +1,1 @@
-"""The mechanics at work: on NumPy arrays, on Torch tensors, compiled by Numba. No formula lives here."""
+"""Runs the mechanics on NumPy arrays, on Torch tensors, and compiled by Numba. Contains no formula."""

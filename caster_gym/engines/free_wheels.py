@@ -1,4 +1,4 @@
-"""Which time steps follow wheels that slip: without grip, a motor turns nothing but its own wheel and link.
+"""Time steps for wheels that slip: without grip, a motor turns nothing but its own wheel and link.
 
 Friction of floor and joints is implicit in the time step (docs/equations.md, section S), so that motors alone bound it:
 their torque is that of the speed at a step's start, and full torque must not throw a free wheel beyond its top speed.
@@ -25,7 +25,7 @@ def check_free_wheels(what: str, rows: Array, time_step: float, substeps: int) -
         return
     longest = 1.0 / (STEPS_TO_TOP * rate)
     count = substeps_for(time_step * substeps, longest)
-    remedy = f"'substeps' of {count} would do, in place of {substeps}"
+    remedy = f"'substeps' of {count} would suffice, in place of {substeps}"
     if count > MOST_SUBSTEPS:
         remedy = f"{count:,} 'substeps', more than a task may have; give the wheels more inertia, or let the floor grip"
     raise ValueError(

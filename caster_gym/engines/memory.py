@@ -1,4 +1,4 @@
-"""Batches that would not fit into memory are refused before anything is allocated."""
+"""Refuses batches that do not fit into memory, before anything is allocated."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What users give to a model, checked, as the scalars of the mechanics; and scalars as what users get."""
+"""Checks the arrays that users give to a model, and converts them to the scalars of the mechanics and back."""
 
 import reprlib
 from abc import ABC, abstractmethod

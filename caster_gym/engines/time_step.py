@@ -1,4 +1,4 @@
-"""Which time steps follow a robot, and what to do about one that does not: checked wherever an engine is given one."""
+"""Which time steps can follow a robot, and what to change if one cannot. Every engine checks its time step."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _UNITS = {"viscous": "N m s/rad", "coulomb": "N m", "scrub": "N m s/rad", "max_t
 def check_time_step(robot: Robot, time_step: float, substeps: int | None = None) -> None:
     """Refuse a time step [s] that cannot follow a robot, and say which would.
 
-    substeps: in how many such steps a control period is cut, if it is; then the number is told that would do.
+    substeps: in how many such steps a control period is cut, if it is; then the number is told that would suffice.
     """
     if not follows(time_step, longest_time_step(robot)):
         raise ValueError(_refusal(f"robot {robot.name!r}", _row(robot), time_step, substeps))
@@ -100,18 +100,18 @@ def _refusal(what: str, row: Array, time_step: float, substeps: int | None) -> s
         return said
     count = substeps_for(time_step * substeps, longest)
     if count <= MOST_SUBSTEPS:
-        return f"{said}: 'substeps' of {count} would do, in place of {substeps}"
+        return f"{said}: 'substeps' of {count} would suffice, in place of {substeps}"
     return f"{said}: {count:,} 'substeps', more than a task may have{_remedies(row, field, time_step, longest)}"
 
 
 def _remedies(row: Array, field: str | None, time_step: float, longest: float) -> str:
-    """What else would do than a short time step."""
+    """What suffices instead of a shorter time step."""
     ways = []
     if field is not None and (enough := _enough(row, field, time_step)) is not None:
         ways.append(f"a {_key(field)!r} of at most {enough} {_unit(field)} in every caster")
     if MOST_SUBSTEPS * longest >= SHORTEST_PERIOD:
         ways.append(f"a 'control_period' of {_round(MOST_SUBSTEPS * longest)} s in {MOST_SUBSTEPS} 'substeps'")
-    return f"; what would do is {' or '.join(ways)}" if ways else ""
+    return f"; {' or '.join(ways)} would suffice" if ways else ""
 
 
 def _enough(row: Array, field: str, time_step: float) -> str | None:

@@ -1,1 +1,1 @@
-"""Tasks, and the Gymnasium environments that pose them."""
+"""What the environments of all tasks share: observations, starts, reports, and the engines that step them."""

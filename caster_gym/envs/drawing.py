@@ -1,4 +1,4 @@
-"""Lets environments draw themselves, as Gymnasium asks; what is drawn, and how, is said in `caster_gym.render`."""
+"""Lets environments draw themselves, as Gymnasium asks; `caster_gym.render` draws."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""What users hand to an environment, checked: counts, seeds, actions and the options of a reset.
+"""Checks of what users give to an environment: counts, seeds, actions and the options of a reset.
 
 Whatever cannot be used is refused with a sentence before anything has changed.
 """

@@ -1,4 +1,4 @@
-"""What robots observe: one list of channels, from which come the numbers, their places, units and meanings.
+"""Observations: one list of channels gives the numbers, their places, units and meanings.
 
 A channel is a function that sees something, and a line in `CHANNELS`, in whose order observations lie. The functions
 are on generic scalars; quantities are in the body frame B.

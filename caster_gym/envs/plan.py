@@ -1,4 +1,4 @@
-"""What a task asks of its robots, prepared for the compiled step: paths, rewards, obstacles and pace."""
+"""A task prepared for the compiled step: paths, rewards, obstacles and pace."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, Protocol, Self, TypeAlias

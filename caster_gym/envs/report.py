@@ -1,4 +1,4 @@
-"""What a control period reports beside observation and reward: its numbers, on generic scalars, and their names.
+"""The report of a control period: its numbers, on generic scalars, and their names.
 
 A report is a row of numbers for each robot: those of `Report`, then the reward's terms, as many as the task has, the
 motor torques, and the slips of wheels that may slip. The rows come from the tuples, see `caster_gym.envs.rows`.

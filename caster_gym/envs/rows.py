@@ -1,4 +1,4 @@
-"""Rows from names: one walk over the fields of named tuples says where each of their numbers stands in an array.
+"""Rows from names: one walk over the fields of named tuples gives the place of each number in an array.
 
     class Motion(NamedTuple):
         pose: Pose  # x, y, cos, sin

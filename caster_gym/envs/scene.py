@@ -1,4 +1,4 @@
-"""What there is to see of one robot at one moment: all that drawing needs, and nothing of how it is computed."""
+"""A scene: everything that drawing needs of one robot at one moment."""
 
 from dataclasses import dataclass
 

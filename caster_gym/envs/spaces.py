@@ -1,4 +1,4 @@
-"""Spaces of the environments."""
+"""Action and observation spaces of the environments."""
 
 import numpy as np
 from gymnasium.spaces import Box

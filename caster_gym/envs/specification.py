@@ -1,4 +1,4 @@
-"""Gymnasium's specification of an environment in plain values, which JSON can hold and `gymnasium.make` read again."""
+"""Gymnasium's specification of an environment in plain values, for JSON and `gymnasium.make`."""
 
 from collections.abc import Mapping
 from dataclasses import replace

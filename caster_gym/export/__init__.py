@@ -1,1 +1,1 @@
-"""Robots for other programs."""
+"""Export of robots to other programs."""

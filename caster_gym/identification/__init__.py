@@ -1,4 +1,4 @@
-"""What numbers a robot really has, from recordings of its motion.
+"""Identification of a robot's numbers from recordings of its motion.
 
 `read_identify`, `identify_file` and `write_example` are the command; `identify` estimates from a `Recording`, which
 `read_recording` reads and `record` simulates. All else is this room's own.

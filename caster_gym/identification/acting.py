@@ -1,4 +1,4 @@
-"""From what a recording says of torques and angles to what is true: strengths, delay, lag, zeros and biases."""
+"""Corrects a recording's torques and angles: motor strengths, delay, lag, zeros and biases."""
 
 from collections.abc import Mapping
 

@@ -129,7 +129,7 @@ def write_identification(found: "Identification", recording: Path, settings: Ide
         value, half, told = found.estimates[k], found.half_widths[k], bool(found.is_told[k])
         spread = (found.deviations[k], value - half, value + half) if told else ("", "", "")
         rows.append((one.name, one.unit, told, one.start, value, *spread))
-    heads = ("name", "unit", "told", "start", "estimate", "standard_deviation", "low", "high")
+    heads = ("name", "unit", "determined", "start", "estimate", "standard_deviation", "low", "high")
     write_csv(folder / "identified.csv", heads, rows)
     names = ", ".join(one.name for one, told in zip(found.unknowns, found.is_told, strict=True) if told) or "nothing"
     remark = f"{found.robot.name} as identified from {recording.name} by `caster-gym identify`: {names}."
@@ -178,7 +178,7 @@ def features_yaml(found: "Identification", recording: Path) -> str:
 
 
 def in_words(found: "Identification") -> str:
-    """The estimates, what is not told, and what to beware of."""
+    """The estimates, the unknowns that are not determined, warnings and notes."""
     lines = []
     for k, one in enumerate(found.unknowns):
         if found.is_told[k]:
@@ -203,23 +203,23 @@ def page(found: "Identification", recording: Path) -> str:
     seconds = (shooting.length - 1) * shooting.recording.time_step
     percent = f"{100 * found.confidence:g} %"
     parts = [
-        f"# What {recording.name} tells of {found.robot.name}",
+        f"# What {recording.name} says about {found.robot.name}",
         f"{shooting.count} windows of {seconds:.3g} s, each predicted by the simulator from an initial state of its "
-        f"own; estimates of greatest likelihood, with {percent} intervals, after {found.steps} steps. Torques are "
-        "taken to be exact; friction may depart from the model's law as far as the recording asks for it.",
+        f"own; maximum-likelihood estimates with {percent} intervals, after {found.steps} steps. Torques are assumed "
+        "to be exact. Friction may deviate from the model's law as far as the recording requires.",
         markdown_table(("", "start", f"estimate, {percent}", "unit"), _estimate_rows(found)),
         *(f"**{sentence}**" for sentence in (*found.untold, *found.warnings)),
         *found.notes,
         "## Errors",
-        "What the model leaves of the recording, beside the noise: as given, else as it shows from one sample to the "
-        "next. If the model were wrong, errors would vary slowly and exceed it.",
+        "The errors that the model leaves, beside the noise. Noise is as given, or as it shows from one sample to the "
+        "next. If the model were wrong, errors would vary slowly and exceed the noise.",
         markdown_table(("", "unit", "error at the start", "error left", "noise", "explained"), _error_rows(found)),
         "![measured and predicted, with the starting values and with the estimates](identified.png)",
         "Initial states are those of the estimates in both cases.",
         *_correlation_parts(found),
-        "`robot.yaml` is the robot file with the estimates in it: a payload as part of the platform, friction that "
-        "came out below zero as zero, motors' greatest torques multiplied by their strengths. Steering zeros, biases, "
-        "delay and lag have no place in it; where they were estimated, they stand in `features.yaml`.",
+        "`robot.yaml` is the robot file with the estimates in it. A payload is part of the platform, negative friction "
+        "is zero, and the motors' maximum torques are multiplied by their strengths. Steering zeros, biases, delay "
+        "and lag have no place in it; where they were estimated, they are in `features.yaml`.",
     ]
     return join_parts(parts)
 
@@ -227,7 +227,7 @@ def page(found: "Identification", recording: Path) -> str:
 def _estimate_rows(found: "Identification") -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for k, one in enumerate(found.unknowns):
-        words = number_words(found.estimates[k], found.half_widths[k]) if found.is_told[k] else "not told"
+        words = number_words(found.estimates[k], found.half_widths[k]) if found.is_told[k] else "not determined"
         rows.append((one.name, f"{one.start:.{_FIGURES}g}", words, one.unit))
     return rows
 

@@ -1,4 +1,4 @@
-"""What is said of a recording whose columns contradict each other or the robot."""
+"""Messages about recordings whose columns contradict each other or the robot."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a recording tells of a robot: estimates by maximum likelihood, with intervals, and what it does not tell.
+"""Estimates of a robot's numbers from a recording by maximum likelihood, with intervals, and what stays undetermined.
 
 Measured quantities carry independent normal errors, of one standard deviation for each kind of quantity; torques are
 taken as they stand in the recording. Windows of the recording are predicted by the simulator, initial states estimated
@@ -46,14 +46,14 @@ _PART = 0.1  # [-] share of a direction from which an unknown takes part in it
 
 @dataclass(frozen=True)
 class Identification:
-    """What a recording tells. Arrays are in the order of `unknowns`."""
+    """The result of a fit. Arrays are in the order of `unknowns`."""
 
     robot: Robot  # with the estimates
     unknowns: tuple[Unknown, ...]
     estimates: Array  # (P,)
-    deviations: Array  # (P,) standard deviations; infinite where an unknown is not told
+    deviations: Array  # (P,) standard deviations; infinite where an unknown is not determined
     half_widths: Array  # (P,) of the intervals
-    correlations: Array  # (P, P); not a number where an unknown is not told
+    correlations: Array  # (P, P); NaN where an unknown is not determined
     confidence: float
     agreements: tuple[Agreement, ...]
     untold: tuple[str, ...]  # sentences: what the recording cannot tell
@@ -67,7 +67,7 @@ class Identification:
 
     @property
     def is_told(self) -> NDArray[np.bool_]:
-        """Which unknowns the recording tells."""
+        """Which unknowns the recording determines."""
         return np.isfinite(self.deviations)
 
 
@@ -185,7 +185,7 @@ def _quantile(confidence: float, freedom: int | None = None) -> float:
 
 
 def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
-    """A sentence for each direction that is not told, with as few unknowns in each as can be."""
+    """A sentence for each direction that is not determined, with as few unknowns in each as possible."""
     from scipy.linalg import qr
 
     if untold.shape[1] == 0:
@@ -197,27 +197,27 @@ def _untold_words(untold: Array, chosen: Sequence[Unknown]) -> list[str]:
     for row in rows:
         parts = [(one, change * one.scale) for one, change in zip(chosen, row, strict=True) if abs(change) > _PART]
         if len(parts) == 1:
-            sentences.append(f"The recording does not tell {parts[0][0].name}.")
+            sentences.append(f"The recording does not determine {parts[0][0].name}.")
         else:
             changes = ", ".join(f"{one.name} {change:+.3g} {one.unit}" for one, change in parts)
             sentences.append(
-                f"The recording does not tell {' and '.join(one.name for one, _ in parts)} apart: it shows no "
+                f"The recording cannot separate {' and '.join(one.name for one, _ in parts)}: it shows no "
                 f"difference when they change together ({changes})."
             )
     return sentences
 
 
 def _entangled_words(correlations: Array, chosen: Sequence[Unknown]) -> list[str]:
-    """Pairs that the recording hardly tells apart, each with its correlation."""
+    """Pairs that the recording can hardly separate, each with its correlation."""
     sentences = []
     for i, one in enumerate(chosen):
         for j, other in enumerate(chosen[:i]):
             if abs(correlations[i, j]) > _ENTANGLED:
                 wider = (1.0 - min(correlations[i, j] ** 2, 1.0 - 1e-12)) ** -0.5
                 sentences.append(
-                    f"{other.name} and {one.name} are hardly told apart; with a correlation of "
-                    f"{correlations[i, j]:+.3f}, knowing either would make the other's interval {wider:.0f} times "
-                    "narrower, at least."
+                    f"{other.name} and {one.name} can hardly be separated: with a correlation of "
+                    f"{correlations[i, j]:+.3f}, knowing one of them would make the interval of the other at least "
+                    f"{wider:.0f} times narrower."
                 )
     return sentences
 

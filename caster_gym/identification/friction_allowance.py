@@ -1,4 +1,4 @@
-"""From a fit that believes the model's friction to one that allows for another, and how sure it is.
+"""Extends a fit by deviations of friction from the model's law, and how certain they are.
 
 Factors of friction's shapes (`caster_gym.identification.friction_shape`) join the unknowns of a fit. Their torques are
 those of the path that was predicted last, so that they are known inputs while a step is taken, and are looked at again

@@ -1,4 +1,4 @@
-"""Friction that departs from the model's law, as far as a recording tells it.
+"""Deviations of friction from the model's law, as far as a recording shows them.
 
 The model's friction of a joint is viscous · ϑ + coulomb · ϑ / √(ϑ² + ϑ₀²). That of a real joint may be sharper at zero,
 greater before it breaks away, or bent at high rates, and an estimate that rests on the law alone is then wrong by more

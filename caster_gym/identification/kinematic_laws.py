@@ -1,4 +1,4 @@
-"""What rolling demands of a recording's columns, window by window, and how far they are from it.
+"""The laws of rolling that a recording's columns must obey, and the errors in them, window by window.
 
 A wheel's direction in the world is φ = β + δ − ζ, with ζ its steering zero (shown minus true angle), and its steering
 axis stands at P = (x, y) + R(β) (x_i, y_i). (K1) and (K2), integrated over a window of samples, are laws of columns

@@ -1,4 +1,4 @@
-"""What logs of robots do to whole columns: old values that are written again, torques that nobody measured."""
+"""Faults of whole columns in logs of robots: repeated old values, torques that were not measured."""
 
 import math
 from dataclasses import replace

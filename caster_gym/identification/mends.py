@@ -1,4 +1,4 @@
-"""Mistakes that recordings of robots have, each as its mend: what would be said of it, and the recording without it."""
+"""Common mistakes in recordings, each with its message and the recording without it."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""How large the noise of each kind of quantity is, and whether it explains the errors that a fit leaves."""
+"""Noise levels of each kind of quantity, and whether noise explains the errors that a fit leaves."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Whether the columns of a recording can belong to one robot that rolls, before anything is fitted to them.
+"""Checks whether the columns of a recording can belong to one rolling robot, before the fit.
 
 Rolling ties pose, steering angles, rolling angles and twist together, whatever the torques are
 (`caster_gym.identification.kinematic_laws`). Where they contradict each other, the usual mistakes are tried one at a

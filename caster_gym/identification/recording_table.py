@@ -1,4 +1,4 @@
-"""From the table of a recording to what was measured, in SI units and at even times."""
+"""Converts the table of a recording to measured quantities in SI units at evenly spaced times."""
 
 from dataclasses import replace
 from pathlib import Path

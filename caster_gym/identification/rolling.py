@@ -1,4 +1,4 @@
-"""How far wheels roll along a path that the simulator has gone: the time integral of (K2)."""
+"""Rolling angles of wheels along a simulated path: the time integral of (K2)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Numbers of a robot that a recording can tell, by name: its payload, casters, motors and sensors.
+"""Quantities that a recording can determine, by name: of payload, casters, motors and sensors.
 
 A payload is a load that is fixed to the platform, as `caster_gym.wrappers.Payload` fixes it; a negative mass is
 something that the robot lacks. Names of `OF_CASTERS` stand for one number that all casters share, or, with a caster's
@@ -151,7 +151,7 @@ def check_names(names: Sequence[str], robot: Robot) -> None:
             )
         meant = _ALSO_CALLED.get(name, name)
         if meant in _UNTELLABLE and name not in UNITS:
-            raise ValueError(f"no recording tells {name!r}: {_UNTELLABLE[meant]}")
+            raise ValueError(f"no recording determines {name!r}: {_UNTELLABLE[meant]}")
         advice = f"did you mean {meant!r}?" if meant != name else did_you_mean(name, [*UNITS, *EACH])
         raise ValueError(f"unknown quantity {name!r} to identify; {advice}")
 

@@ -1,4 +1,4 @@
-"""Least squares over windows: Gauss–Newton's method for what all windows share, their initial states eliminated.
+"""Least squares over windows: Gauss–Newton for shared unknowns, with the windows' initial states eliminated.
 
 Errors e of all samples, each over its noise σ, are linear near a point: e + A dx + B du, with A (W, m, n) for the state
 dx that each window starts from and B (W, m, P) for the shared unknowns du, counted in their scales. For each window the

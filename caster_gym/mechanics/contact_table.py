@@ -1,4 +1,4 @@
-"""All places where a robot may touch obstacles, in one table of numbers that compiled code fills and sweeps over.
+"""A table of all places where a robot may touch obstacles, for compiled code.
 
 A contact is a row of FIELDS numbers; a table is flat memory of any kind of scalar, see `scalars.memory`.
 """

@@ -1,4 +1,4 @@
-"""Forces between wheels and floor: they tell when rolling without slip ends. docs/equations.md, section G."""
+"""Forces between wheels and floor, which show when rolling without slip ends. docs/equations.md, section G."""
 
 from typing import NamedTuple
 

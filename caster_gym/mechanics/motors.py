@@ -1,4 +1,4 @@
-"""Motors: what they can give at their present speed, and the gear between them and the two joints of a caster.
+"""Motors: their torque at their present speed, and the gear between them and the two joints of a caster.
 
 Joint rates turn the motors through `gear`: motor speeds = gear · (θ̇, δ̇). Power is the same on both sides, so torques
 go back through its transpose: joint torques = gearᵀ · motor torques. The motors' limits hold at the motors.

@@ -1,4 +1,4 @@
-"""Which robots must be stepped with care, because an obstacle may be near.
+"""Which robots need careful steps because an obstacle may be near.
 
 A robot's room is a lower bound on its gap to the nearest obstacle [m]. A step that certainly uses up less than the room
 is an ordinary one, so that robots in the open keep their speed; only the others measure gaps.

@@ -1,4 +1,4 @@
-"""What the equations need besides +, −, × and ÷: choices, roots, and loops over casters, for every kind of scalar.
+"""Operations of the equations besides +, −, × and ÷: choices, roots, and loops over casters, for every scalar.
 
 Python's and NumPy's numbers and NumPy's arrays choose and take roots by themselves; whoever brings another kind of
 scalar says with `register` how it does, as the engines on Torch do. A kind that nobody registered is a TypeError: by

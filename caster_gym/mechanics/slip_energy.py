@@ -1,4 +1,4 @@
-"""No step makes more energy than motors, wrench and the order of the step explain. docs/equations.md, section S."""
+"""Limits the energy gain of a step to that of motors, wrench and the step's order. docs/equations.md, section S."""
 
 from caster_gym.mechanics.floor_friction import TINY
 from caster_gym.mechanics.free_casters import Pair, slip_energy

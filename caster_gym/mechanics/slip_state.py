@@ -1,4 +1,4 @@
-"""States of robots whose wheels may slip: rates of the casters are numbers of their own, as is the tilt."""
+"""States of robots whose wheels may slip, with the rates of the casters and the tilt as numbers of their own."""
 
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.free_casters import Pair, slip_velocity

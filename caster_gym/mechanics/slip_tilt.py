@@ -1,4 +1,4 @@
-"""How a robot whose wheels may slip tilts onto some of them as it moves. docs/equations.md, section S."""
+"""The tilt of a robot whose wheels may slip, which shifts loads between them. docs/equations.md, section S."""
 
 from caster_gym.mechanics.caster import pivot_velocity
 from caster_gym.mechanics.floor_friction import NO_TIME

@@ -1,4 +1,4 @@
-"""How fast a robot's state can change, which bounds the time steps that follow it. docs/equations.md, section I.
+"""The fastest rates of a robot's state, which bound the time step. docs/equations.md, section I.
 
 Friction and motors pull at the platform like dampers: −D ν is the force that they add for a twist ν, and the greatest
 eigenvalue of D beside the inertia matrix is a rate [1/s].

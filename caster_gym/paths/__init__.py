@@ -1,4 +1,4 @@
-"""Where to go: timed trajectories of the platform."""
+"""Paths and timed trajectories of the platform."""
 
 from caster_gym.paths.specification import PathSpecification, build_trajectories, read_paths
 from caster_gym.paths.trajectory import COLUMNS, Trajectory

@@ -1,4 +1,4 @@
-"""What would make a path one that can be driven: found by trying, so that the advice holds."""
+"""Advice on how to make a path drivable, found by trying, so that it holds."""
 
 from collections.abc import Iterator
 from typing import Protocol, Self

@@ -1,4 +1,4 @@
-"""Angles in the unit that is said, and none in degrees by mistake."""
+"""Angles in their stated unit, checked for degrees given as radians."""
 
 import math
 from collections.abc import Mapping, Sequence

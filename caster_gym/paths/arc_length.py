@@ -1,4 +1,4 @@
-"""Where a path leads, by its arc length instead of by time.
+"""The geometry of a path by its arc length instead of by time.
 
 s        arc length from the start                                  [m]
 tangent  dp/ds, unit complex number, in W                           [-]
@@ -55,8 +55,8 @@ class CoarseSpacingError(ValueError):
     """A path that is too short or turns too sharply for a spacing."""
 
     def __init__(self, what: str, spacing: float) -> None:
-        super().__init__(f"{what}; a spacing of {spacing:g} m would do")
-        self.what, self.spacing = what, spacing  # [m] one that would do
+        super().__init__(f"{what}; a spacing of {spacing:g} m would suffice")
+        self.what, self.spacing = what, spacing  # [m] one that would suffice
 
 
 def line_along(trajectory: Trajectory, spacing: float, free_heading: bool) -> Line:

@@ -1,4 +1,4 @@
-"""Paths to be followed at the robot's own pace: where they lead, and how fast the robot's motors can drive them."""
+"""Paths without times: their geometry, and how fast the robot's motors can drive them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ def build_courses(
     too sharply or is too short for that. margin: share of the motors' torque and speed that the law may use.
 
     Raises ValueError for a path that stands still, stops or turns back on its way, turns too sharply for the spacing,
-    or along which the robot cannot move; the message says where, and what would do.
+    or along which the robot cannot move; the message says where, and what would suffice instead.
     """
     _check_positive("speed_limit", speed_limit, "m/s")
     if spacing is not None:
@@ -139,7 +139,7 @@ def _lines(
         remedies = [] if free_heading or not _makes_lines(specification, True) else ["a free heading"]
         wider = next((words for one, words in _wider(specification, source) if _makes_lines(one, free_heading)), None)
         remedies += [wider] if wider else []
-        advice = f"; {' or '.join(remedies)} would do" if remedies else ""
+        advice = f"; {' or '.join(remedies)} would suffice" if remedies else ""
         timed = timed_remedy(source, robot, _TIMED_STEP)
         if timed is not None:
             by = "at its own times" if isinstance(source, Timed) else "in the time of its 'duration'"

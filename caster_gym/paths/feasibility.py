@@ -1,4 +1,4 @@
-"""Can the motors of a robot drive a trajectory?
+"""Checks whether the motors of a robot can drive a trajectory.
 
 The robot rolls without slip, its casters trail, and its motors share the work with the least effort.
 
@@ -137,7 +137,7 @@ class _Hardest:
 
 
 def check_feasible(path: Easable, trajectories: Sequence[Trajectory], robot: Robot) -> None:
-    """Refuse trajectories of a path that ask more of the robot's motors than they have; say what would do.
+    """Refuse trajectories of a path that need more than the robot's motors have; the message says what suffices.
 
     Raises ValueError with the path, joint, time and torques, and gentler limits that were tried and found to do.
     """
@@ -201,7 +201,7 @@ def _remedy(path: Easable, time_step: float, robot: Robot) -> str:
             high *= _PRECISION
     except ValueError:
         return f"it must be driven {high:.3g} times as slowly, which takes more time steps than a path may have"
-    return f"{path.ease(high).remedy} would do"
+    return f"{path.ease(high).remedy} would suffice"
 
 
 def _motors(motion: Motion, robot: RobotParameters) -> tuple[Array, Array, Array, Array]:

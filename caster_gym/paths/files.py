@@ -1,4 +1,4 @@
-"""Files of paths: tables of waypoints or of timed poses, race lines, and what planners write as JSON.
+"""Files of paths: tables of waypoints or of timed poses, race lines, and JSON files of planners.
 
 What is read becomes the content of a specification: waypoints of a spline, or poses with times. docs/files.md shows an
 example of each kind of file.

@@ -1,4 +1,4 @@
-"""Where the body x-axis points along a path: along the tangent, fixed, spinning, or through angles of your own."""
+"""Headings along a path: along the tangent, fixed, spinning, or through given angles."""
 
 from collections.abc import Mapping
 from itertools import pairwise

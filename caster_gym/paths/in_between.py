@@ -1,4 +1,4 @@
-"""Motions between two moments at which place, velocity and acceleration are known.
+"""Motions between two moments with known position, velocity and acceleration.
 
 The place is the quintic that has all three at both ends. The velocity is the cubic that has its own and the
 accelerations, so that places which do not quite agree with velocities change neither. The acceleration is that of the

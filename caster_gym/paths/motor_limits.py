@@ -1,4 +1,4 @@
-"""What a robot's motors allow at each place along a line: half-planes for a law to keep, and how far a law breaks them.
+"""Limits of a robot's motors at each place along a line, as half-planes, and how far a time law exceeds them.
 
 Casters trail: how they steer along a line depends on where they are, not on when. So at each point the motors' shares
 of their greatest torques are linear in s̈ and ṡ², but for friction, and their limits make half-planes.
@@ -292,5 +292,5 @@ def _refuse_stiction(left: Array, lines: Sequence[Line], robot: Robot, margin: f
         takes, else_ = f"pushes where the driven joints, {', '.join(robot.driven)}, cannot", ""
     raise ValueError(
         f"the robot cannot move along path {line.name!r} at s = {f * line.spacing / PARTS:.3g} m, (x, y) = "
-        f"({x:.3g}, {y:.3g}) m: dry friction {takes}, and the margin is {margin:g}; less friction would do{else_}"
+        f"({x:.3g}, {y:.3g}) m: dry friction {takes}, and the margin is {margin:g}; less friction would suffice{else_}"
     )

@@ -1,4 +1,4 @@
-"""Names that nobody knows, and the nearest one that is known."""
+"""Errors about unknown names, with the nearest known one."""
 
 from collections.abc import Iterable
 

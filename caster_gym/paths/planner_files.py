@@ -1,4 +1,4 @@
-"""What planners of the FIRST Robotics Competition write: trajectories of WPILib and Choreo, paths of PathPlanner."""
+"""Files of planners of the FIRST Robotics Competition: WPILib, Choreo and PathPlanner."""
 
 import json
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""How finely numbers were written down, as their own digits and steps show."""
+"""Estimates how finely numbers were written down, from their digits and steps."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Splines that pass beside values instead of through them, as smoothly as a tolerance allows.
+"""Smoothing splines, which pass values within a tolerance.
 
 Penalised splines: Eilers and Marx, "Flexible smoothing with B-splines and penalties", Statistical Science, 1996. Of all
 quintic splines with knots at the values' places whose root mean square distance from the values is at most the

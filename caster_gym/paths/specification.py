@@ -1,4 +1,4 @@
-"""Paths as they are written in YAML and in Python, and the trajectories they stand for."""
+"""Specifications of paths in YAML and Python, and the trajectories made from them."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -116,7 +116,7 @@ def _size_of_points(items: list[Any]) -> int | None:
 def build_trajectories(path: PathLike, robot: Robot, time_step: float) -> tuple[Trajectory, ...]:
     """The timed trajectories of all paths. Time step in s.
 
-    Raises ValueError for one that the motors of the robot cannot drive; the message says what would do.
+    Raises ValueError for one that the motors of the robot cannot drive; the message says what would suffice instead.
 
     >>> import caster_gym
     >>> robot = caster_gym.load_robot("chung2008")
@@ -130,7 +130,7 @@ def build_trajectories(path: PathLike, robot: Robot, time_step: float) -> tuple[
             trajectories = specification.trajectories(time_step)
         except ValueError as error:
             remedy = timed_remedy(specification, robot, time_step)
-            advice = f"; {remedy} would do" if remedy else ""
+            advice = f"; {remedy} would suffice" if remedy else ""
             raise ValueError(f"path {specification.shape!r}: {error}{advice}") from error
         check_feasible(specification, trajectories, robot)
         built.extend(trajectories)

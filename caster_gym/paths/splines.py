@@ -81,7 +81,7 @@ class Spline(Shape):
         if extent > SAME_PLACE and _LEAST_SIZE * (self.tolerance or 0.0) > extent:
             raise ValueError(
                 f"a tolerance of {self.tolerance:g} m is more than a tenth of the {extent:.3g} m that the waypoints "
-                f"extend; at most {rounded_down(extent / _LEAST_SIZE):g} m would do"
+                f"extend; at most {rounded_down(extent / _LEAST_SIZE):g} m would suffice"
             )
         fewest = _fewest_places(self._track)
         if fewest < 3:

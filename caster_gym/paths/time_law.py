@@ -1,4 +1,4 @@
-"""The fastest way along a line, from rest to rest, within the limits of a robot's motors.
+"""The fastest motion along a line, from rest to rest, within the limits of a robot's motors.
 
 Every interval between rows has one s̈. Half-planes (`motor_limits`) are kept at PARTS + 1 points of it, so that they
 hold at both of its rows. A backward pass finds the greatest ṡ² from which the end can still be reached, a forward pass

@@ -1,4 +1,4 @@
-"""Trajectories that have times of their own: recorded, planned by others, or typed as poses with times."""
+"""Trajectories with given times: recorded, planned by other programs, or typed as poses with times."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Smooth motions in time through samples of it, whose rounding and noise are not taken for accelerations.
+"""Smooth motions through timed samples, without the accelerations that rounding and noise would cause.
 
 The quintic smoothing spline: of all curves that are as near to the samples as their noise is large, the one with the
 least ∫ |x‴|². Reinsch, "Smoothing by spline functions", Numerische Mathematik, 1967.

@@ -1,4 +1,4 @@
-"""How casters steer when their pivots are led along a line: they trail, whatever the speed.
+"""Steering angles of casters whose pivots move along a line: they trail, at any speed.
 
     psi      rolling direction of a caster in W, unit complex number         [-]
     V        velocity of its pivot, in W

@@ -1,4 +1,4 @@
-"""What every path ends in: a table of the platform's motion, sampled at a constant time step.
+"""Trajectories: tables of the platform's motion, sampled at a constant time step.
 
 Points and vectors of the plane are complex numbers x + i y throughout this package.
 """
@@ -86,7 +86,7 @@ def whole_steps(duration: float, time_step: float) -> int:
     if duration > MOST_STEPS * time_step:
         raise ValueError(
             f"a duration of {duration:g} s is more than {MOST_STEPS} time steps of {time_step:g} s; "
-            f"at most {rounded_down(MOST_STEPS * time_step, 6):g} s would do"
+            f"at most {rounded_down(MOST_STEPS * time_step, 6):g} s would suffice"
         )
     steps = round(duration / time_step)
     if steps < LEAST_STEPS:

@@ -1,4 +1,4 @@
-"""One leg of a path through waypoints as functions of its progress 0 … 1."""
+"""The legs of a path through waypoints, as functions of progress 0 … 1."""
 
 from typing import Any
 

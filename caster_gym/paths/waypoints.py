@@ -1,4 +1,4 @@
-"""What a list of waypoints says: where it moves, where it rests, how finely it was written down.
+"""Analysis of waypoints: where they move, where they rest, and how finely they are rounded.
 
 A path through waypoints is a sequence of legs, each from rest to rest: curves, and turns on the spot between them.
 """

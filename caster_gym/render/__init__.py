@@ -1,1 +1,1 @@
-"""What a robot on its path looks like: frames for people and videos, drawn with pygame-ce from scenes alone."""
+"""Pictures of a robot on its path, drawn with pygame-ce from scenes alone."""

@@ -1,4 +1,4 @@
-"""A frame of its own for each of many robots: what a batch's render() returns. Needs pygame-ce."""
+"""Frames of many robots, one for each: what a batch's render() returns. Needs pygame-ce."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What moves: the robot with its casters and the forces on its wheels, its reference, its trace and its impacts."""
+"""Draws what moves: the robot with its casters and wheel forces, its reference, its trace and its impacts."""
 
 import math
 

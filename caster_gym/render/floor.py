@@ -1,4 +1,4 @@
-"""What stands still: the floor with its patches, the path with its corridor, and the obstacles."""
+"""Draws what stands still: the floor with its patches, the path with its corridor, and the obstacles."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a viewer remembers of one robot: where it has been, how far off it was, and what it has hit."""
+"""The history of one robot that a viewer keeps: its trace, its errors, and its impacts."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The colours of all pictures: few, on light ground, told apart by colour-blind eyes."""
+"""The colours of all pictures: few, on a light ground, and distinct for colour-blind people."""
 
 from typing import TypeAlias
 

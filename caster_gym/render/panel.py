@@ -1,4 +1,4 @@
-"""The column beside the map: the robot close up, its numbers, its error over time and its motors' torques."""
+"""Draws the column beside the map: the robot close up, its numbers, its error over time and its motors' torques."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""pygame-ce, or a sentence that says how to get it."""
+"""Imports pygame-ce, or raises an error that says how to install it."""
 
 import os
 import warnings

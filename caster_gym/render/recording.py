@@ -1,4 +1,4 @@
-"""Frames to a film on disk: .mp4 or .gif, there whole or not at all."""
+"""Writes frames to a video file, .mp4 or .gif, which appears whole or not at all."""
 
 import shutil
 import tempfile
@@ -35,7 +35,7 @@ def check_target(file: Path, overwrite: bool = False, size: tuple[int, int] = (2
     Raises ValueError, OSError or gymnasium.error.DependencyNotInstalled.
     """
     if file.suffix.lower() not in SUFFIXES:
-        raise ValueError(f"a film must be saved as {' or '.join(SUFFIXES)}, got {file.name!r}")
+        raise ValueError(f"a video must be saved as {' or '.join(SUFFIXES)}, got {file.name!r}")
     if file.suffix.lower() == ".mp4":
         _refuse_odd(*size)
     if not file.absolute().parent.is_dir():
@@ -112,7 +112,7 @@ class _Mp4:
 
     def finish(self) -> None:
         if self._sink is None:
-            raise ValueError("a film needs at least one frame")
+            raise ValueError("a video needs at least one frame")
         self._sink.close()
 
     def give_up(self) -> None:
@@ -143,7 +143,7 @@ class _Gif:
         from PIL import Image
 
         if not self._frames:
-            raise ValueError("a film needs at least one frame")
+            raise ValueError("a video needs at least one frame")
         chosen = self._frames[:: -(-len(self._frames) // PALETTE_FRAMES)]
         whole = Image.fromarray(np.concatenate([self._unpacked(frame) for frame in chosen]))
         palette = whole.quantize(MOST_COLOURS, Image.Quantize.MAXCOVERAGE)

@@ -1,4 +1,4 @@
-"""Which part of the world a picture shows, and where: metres to pixels and back.
+"""The part of the world that a picture shows: metres to pixels and back.
 
 Pixel coordinates are continuous, x to the right and y down: pixel (i, j) covers [i, i + 1) × [j, j + 1).
 World coordinates are in W, y up.

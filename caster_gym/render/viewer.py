@@ -1,4 +1,4 @@
-"""From scenes to frames: what the environments' render() shows or returns. Needs pygame-ce."""
+"""Turns scenes into frames, which the environments' render() shows or returns. Needs pygame-ce."""
 
 import copy
 import os

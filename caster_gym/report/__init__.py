@@ -1,1 +1,1 @@
-"""What is written for readers: pages, tables, figures, and the folders of runs."""
+"""Output for readers: pages, tables, figures, and the folders of runs."""

@@ -1,4 +1,4 @@
-"""How all figures are set up: size, resolution, grid, colours of lines, and a legend for the whole figure."""
+"""The style of all figures: size, resolution, grid, colours of lines, and a legend for the whole figure."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""Where a result came from: versions, commit and settings, written beside it."""
+"""Provenance of results: versions, commit and settings, written beside them."""
 
 import platform
 import shlex

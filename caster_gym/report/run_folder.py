@@ -1,4 +1,4 @@
-"""Folders of results: tried before anything is computed, never mixed with what was there, and deleted only if ours."""
+"""Folders of results: checked before anything is computed, never mixed with other files, deleted only if ours."""
 
 import errno
 import shutil

@@ -1,4 +1,4 @@
-"""Actions that mean something else than torques: corrections of another agent, twists, joint speeds.
+"""Actions with another meaning than torques: corrections of another agent, twists, joint speeds.
 
 Inner loops run at the control period, on the observation that reaches them and nothing else.
 """

@@ -1,4 +1,4 @@
-"""Environments with features: one robot, or a batch, from the same features."""
+"""Environments with features, for one robot or a batch."""
 
 import copy
 from collections.abc import Mapping, Sequence

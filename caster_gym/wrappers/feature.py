@@ -1,4 +1,4 @@
-"""What a feature is: a description that is checked once, and the part that works for a number of robots.
+"""Features: a description that is checked once, and the part that works for a number of robots.
 
 Arrays have one row per robot. `robots` picks some of them: an array of indices, or slice(None) for all.
 """

@@ -1,4 +1,4 @@
-"""What inner loops know: their observation, turned back into states of the robot, and its nominal model."""
+"""What inner loops share: states of the robot, decoded from observations, and its nominal model."""
 
 import numpy as np
 

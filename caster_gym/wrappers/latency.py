@@ -1,4 +1,4 @@
-"""What stands between a command and a torque: waiting, and motors that follow slowly."""
+"""Latency between commands and torques: delays, and motors that lag."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""Robots that are not as their description says: loads, friction, wheels. Every episode draws anew, from the nominal.
+"""Robots that differ from their description: loads, friction, wheels. Every episode draws from the nominal robot.
 
 Only the plant changes; agents know the nominal robot. Parameters are rows (k, fields) in the order of
 `caster_gym.mechanics.parameters.pack_parameters`.

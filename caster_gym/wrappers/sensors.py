@@ -1,4 +1,4 @@
-"""What sensors say: noise, bias and encoders that are mounted askew.
+"""Sensors with noise, bias and misaligned encoders.
 
 Noise enters where a robot measures, in its pose, twist, steering angles and joint rates, and all parts of an
 observation that are computed from a measurement follow it: a heading that is wrong by ε turns everything that is seen

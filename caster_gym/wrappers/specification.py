@@ -1,4 +1,4 @@
-"""Features as they are written in YAML and in Python."""
+"""Features as they are written in YAML and Python."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, TypeAlias, get_args

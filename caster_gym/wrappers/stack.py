@@ -1,4 +1,4 @@
-"""The features of an environment at work, in their order, for one robot or for a batch."""
+"""Applies the features of an environment in their order, for one robot or for a batch."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""The inner loop of twist commands.
+"""The inner loop that tracks twist commands.
 
     v        twist (vx, vy, ω) in B, v at the start of a control period T, v′ wanted at its end
     c        commanded twist in B

@@ -173,7 +173,7 @@ def shortest(path: AnyPath, robot: Robot, longest: float) -> float:
     if asks(high) > RESERVE:
         raise ValueError(
             f"robot {robot.name!r} cannot drive path {path.shape!r} in {longest:g} s with {1.0 - RESERVE:.0%} of its "
-            f"motors in reserve; a longer time would do"
+            f"motors in reserve; a longer time would suffice"
         )
     while high > _ACCURACY * low:
         middle = (low * high) ** 0.5

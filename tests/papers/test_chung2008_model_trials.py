@@ -99,7 +99,7 @@ def test_the_shortest_time_leaves_the_motors_their_reserve_and_no_more():
     duration = shortest(CIRCLE, ROBOT, 30.0)
     use = [float(motor_use(timed(CIRCLE, f * duration).trajectories(PERIOD), ROBOT).use[0]) for f in (1.0, 0.98)]
     assert use[0] <= RESERVE < use[1]  # it is sought to 1 %
-    with pytest.raises(ValueError, match=r"'chung2008' cannot drive path 'circle' in 3 s .* longer time would do"):
+    with pytest.raises(ValueError, match=r"'chung2008' cannot drive path 'circle' in 3 s .* longer time would suffice"):
         shortest(CIRCLE, ROBOT, 3.0)
 
 

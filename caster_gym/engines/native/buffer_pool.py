@@ -1,4 +1,4 @@
-"""Arrays that are used again once nobody holds them any more.
+"""A pool of arrays, each used again as soon as no reference to it is left.
 
 Big arrays come from the operating system in fresh pages, each of which costs a fault when it is first written: as much
 as a third of a step of a few thousand robots.

@@ -1,4 +1,4 @@
-"""Compiling is announced when it starts, done by one process for all others, and kept on disk.
+"""Compilation is announced when it starts, done by one process for all others, and kept on disk.
 
 Numba asks the cache of a function for each specialisation, that is, for each set of argument types. What is not there
 will be compiled now: this is the only moment at which an announcement is sure to be true.

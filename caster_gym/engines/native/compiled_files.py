@@ -1,4 +1,4 @@
-"""Where compiled code lies on disk: in one folder for all environments that have the same sources, Python and Numba.
+"""The folder of compiled code on disk, shared by environments with the same sources, Python and Numba.
 
 Numba's own cache depends on where a package is installed, so that each virtual environment would compile anew, and two
 processes that save different code of one function at the same time may leave it under the wrong name. Here every

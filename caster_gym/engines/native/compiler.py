@@ -1,4 +1,4 @@
-"""Teaches Numba the generic mechanics.
+"""Makes Numba compile the generic mechanics.
 
 The number of casters is the length of a tuple, hence part of a type: loops over casters unroll while compiling, every
 intermediate value is a register, and a loop over the robots of a block becomes SIMD instructions. Arithmetic stays

@@ -1,4 +1,4 @@
-"""What lies in a block of the bare mechanics, for floors that grip and floors that wheels slip on."""
+"""The layout of a block of bare robots, for floors that grip and floors that wheels slip on."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Obstacles and floor as compiled code takes them; None where there are none, and what minds them is left out."""
+"""Obstacles and floor as compiled code takes them; None leaves out the code that handles them."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A tuple of arrays that compiled code gets by one reference.
+"""A tuple of arrays that is passed to compiled code as one reference.
 
 A call of compiled code takes every array of a tuple apart, which costs a microsecond for a dozen of them: as much as
 two time steps of a robot.

@@ -1,4 +1,4 @@
-"""Compiled code that depends on sources outside the package: which ones, so that an edit compiles it anew.
+"""Which sources outside the package compiled code depends on, so that an edit compiles it again.
 
 Named tuples tell: whoever compiles code for a type of theirs notes with it the modules whose functions the code calls.
 """

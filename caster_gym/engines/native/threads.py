@@ -1,4 +1,4 @@
-"""Compiled code on several cores: blocks of robots shared out over threads that release the interpreter's lock.
+"""Compiled code on several cores: threads that release the interpreter's lock share the blocks of robots.
 
 Threads that sleep while they wait keep their speed beside other busy processes; spinning ones, as OpenMP's, then lose
 most of it. How many are used follows from the environment, see `default_threads`, until `set_threads` is called. The

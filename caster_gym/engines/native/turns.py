@@ -1,4 +1,4 @@
-"""One process at a time does a long piece of work that all others then find done."""
+"""Lets one process at a time do a long piece of work, which all other processes then find done."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Sums and products with the zeros of a robot's parameters, taken out of what Torch compiles.
+"""Removes sums and products with zero parameters of a robot from what Torch compiles.
 
 A robot without friction, offsets and armatures multiplies nearly half of its terms by zero. Torch's compiler keeps
 them, since 0 · x and 0 / x are not zero where x is no number, or 0; in the mechanics such an x shows in the inertial

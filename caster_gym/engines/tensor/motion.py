@@ -1,4 +1,4 @@
-"""Time steps of driven robots in rows of tensors, in regions that the compiler works out once however often they come.
+"""Time steps of driven robots in rows of tensors, in regions that Torch compiles once and uses often.
 
 Rows of a state, each with an entry a robot: x, y, cos β, sin β in W, twist in B, cos δ, sin δ of each caster.
 """

@@ -1,4 +1,4 @@
-"""Torch tensors as scalars of the mechanics, and where they live: every Torch engine begins here."""
+"""Torch tensors as scalars of the mechanics, on a device. Every Torch engine starts from this file."""
 
 import os
 from collections.abc import Sequence

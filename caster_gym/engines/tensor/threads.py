@@ -1,4 +1,4 @@
-"""How many threads learning and evaluating take: one, unless somebody asks for more.
+"""The number of threads for learning and evaluation: one, unless the user chooses more.
 
 Networks and batches are so small here that a second thread gains little on a machine at rest, and beside another busy
 process the two wait for each other most of the time. Sums depend on how they are shared out, so that a training run

@@ -1,1 +1,1 @@
-"""The life of a step, compiled by Numba."""
+"""The control period of a task, compiled by Numba."""

@@ -1,4 +1,4 @@
-"""What compiling the step of a task is called in announcements, and how long it takes."""
+"""Announcements of compilation: what is compiled for a task, and how long it takes."""
 
 from typing import Any
 

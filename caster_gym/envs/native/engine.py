@@ -1,4 +1,4 @@
-"""Every task for any number of robots, moved by compiled code; the environments are thin faces of this."""
+"""The engine of every task, for any number of robots, in compiled code; the environments are thin layers above it."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""What leads the robots and what rewards them, as compiled code reads it, whatever the task.
+"""References and rewards of a task, as compiled code reads them.
 
 A task has a reference source, a named tuple of arrays, and says which functions go with its type: `register_task`. The
 functions below are chosen by that type while compiling, so that a task pays for nothing that only another one needs.

@@ -1,4 +1,4 @@
-"""What is kept of the robots of a task from step to step: states, parameters, clocks and seeds, in blocks."""
+"""What a task stores of its robots between steps: states, parameters, clocks and seeds, in blocks."""
 
 import copy
 from collections.abc import Callable

@@ -1,1 +1,1 @@
-"""The life of a step on Torch's tensors."""
+"""The control period of a task on Torch tensors."""

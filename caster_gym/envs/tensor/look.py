@@ -1,4 +1,4 @@
-"""What robots on tensors have achieved when they have moved, and what they see: fetch, evaluate, observe, report.
+"""Evaluation and observation of robots on tensors after a motion: fetch, evaluate, observe, report.
 
 The arithmetic is that of `caster_gym.envs.tracking` and the tasks, whose generic functions run here on tensors with an
 entry a robot. Nothing waits for the device, and nothing is written in place.

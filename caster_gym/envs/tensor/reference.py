@@ -1,4 +1,4 @@
-"""What leads the robots, for a batch of tensors: what a reference source makes `on_tensors`."""
+"""The protocol of reference sources on tensors, which `on_tensors` makes."""
 
 from typing import Any, NamedTuple, Protocol
 

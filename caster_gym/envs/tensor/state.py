@@ -1,4 +1,4 @@
-"""What a batch of robots on tensors keeps from one control period to the next, is given for one, and gets from it."""
+"""The state, inputs and outcome of a batch of robots on tensors in a control period."""
 
 from typing import NamedTuple
 

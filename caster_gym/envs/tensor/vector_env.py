@@ -1,4 +1,4 @@
-"""A batch of environments whose observations, actions and rewards never leave the device."""
+"""A vector environment whose observations, actions and rewards stay on the device."""
 
 import copy
 from collections.abc import Mapping, Sequence
