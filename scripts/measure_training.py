@@ -42,6 +42,7 @@ from caster_gym.agents.learning.shac import ShortHorizon, make_task
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.agents.registry import read_agent
 from caster_gym.engines.native.threads import set_threads
+from caster_gym.envs.plan import SPAN
 from caster_gym.report.provenance import command_line
 from caster_gym.report.run_folder import check_can_be_made
 from caster_gym.shipped_files import read_settings
@@ -160,7 +161,7 @@ def empty_cache() -> Iterator[None]:
 def share_rows(task: TaskSettings, settings: PPOSettings) -> list[Row]:
     """PPO on our robots and on free ones, with the same settings."""
     ours = SB3VecEnv(training_batch(task, settings.n_envs))
-    longest = round(float(np.mean(bare(ours.batch).engine.plan.source.spans[:, 2])))
+    longest = round(float(np.mean(bare(ours.batch).engine.plan.source.spans[:, SPAN.periods])))
     free, round_ = FreeVecEnv(ours, longest), settings.n_envs * settings.n_steps
     return [
         Row(key, key, RATE, learning(make_learner(settings, environment, seed=0), round_))

@@ -1,5 +1,7 @@
 """agents.learning.shac: its gradient is that of the return, its critic's targets are TD(λ)'s, and it learns."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -16,7 +18,10 @@ from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.tasks.track.parameters import TrackParameters
 
-QUICK = {"control_period": 0.01, "substeps": 1}  # one RK4 step a period: Torch alone, uncompiled, is slow
+QUICK: dict[str, Any] = {
+    "control_period": 0.01,
+    "substeps": 1,
+}  # one RK4 step a period: Torch alone, uncompiled, is slow
 PATH = {"shape": "random_paths", "duration": 2.5, "max_speed": 0.3, "count": 2}
 TASK = parse(
     TaskSettings,
@@ -47,7 +52,7 @@ def one_thread():
 
 
 def learner(longest=None, dtype=torch.float64, seed=0, **changes):
-    task = TorchTask("track", path=[{**PATH, "seed": 0}], fields=QUICK, longest=longest, dtype=dtype)
+    task = TorchTask("track", path=[{**PATH, "seed": 0}], max_episode_steps=longest, dtype=dtype, **QUICK)
     return ShortHorizon(task, parse(SHACSettings, {**FIELDS, **changes}, "agent"), seed)
 
 
@@ -161,8 +166,8 @@ def test_policies_get_better():
     robot = robot.model_copy(
         update={"casters": tuple(caster.model_copy(update={"trail": 0.1, "steer": slow}) for caster in robot.casters)}
     )
-    coarse = {"control_period": 0.04, "substeps": 1, "preview": (0.08, 0.2, 0.4)}
-    task = TorchTask("track", robot, path=[{**PATH, "seed": 0}], fields=coarse)
+    coarse: dict[str, Any] = {"control_period": 0.04, "substeps": 1, "preview": (0.08, 0.2, 0.4)}
+    task = TorchTask("track", robot, path=[{**PATH, "seed": 0}], **coarse)
     changes = {"n_envs": 16, "n_steps": 12, "batch_size": 192, "critic_learning_rate": 1e-12, "learning_rate": 1e-2}
     learning = ShortHorizon(task, parse(SHACSettings, {**FIELDS, **changes}, "agent"), seed=0)
     for parameter in (*learning.critic.parameters(), *learning.target.parameters()):

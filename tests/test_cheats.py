@@ -7,6 +7,7 @@ from gymnasium.vector import AutoresetMode
 from caster_gym.agents.comparison.evaluation import bare, make_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.envs.plan import SPAN
 from caster_gym.shipped_files import names_of, read_settings
 from caster_gym.tasks.follow.environment import CasterFollowVectorEnv
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
@@ -50,7 +51,7 @@ def test_full_torque_earns_little(task):
 def test_computed_torque_earns_most_of_what_there_is(task):
     """Of progress and quality, beside the term `alive`; at the start there is the displacement to be overcome."""
     batch, honest = task
-    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, 2]
+    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, SPAN.periods]
     alive = batch.task.effort_weight + batch.task.impact_weight
     assert (honest - alive * steps > 0.7 * steps).all()
 
@@ -58,7 +59,7 @@ def test_computed_torque_earns_most_of_what_there_is(task):
 def test_a_parked_robot_earns_hardly_more_than_alive():
     """What little effort parking takes, and up to 3 cm of way from the start, which count in full once."""
     batch = CasterFollowVectorEnv(ROBOTS, path=PATHS, arena=ARENA)
-    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, 2]
+    steps = batch.engine.plan.source.spans[np.arange(ROBOTS) % 4, SPAN.periods]
     earned = scores(cheat(batch, "park"), batch, SEED)
     assert (earned > 0.51 * steps).all()
     assert (earned < 0.52 * steps + 1.5).all()

@@ -134,7 +134,7 @@ def test_rewards_with_respect_to_the_initial_state(task):
 @pytest.mark.slow
 def test_following_rewards_with_respect_to_actions():
     """Through the projection on the path, from 20 periods on the way; 1e-4: Newton's steps stop near its root."""
-    task = TorchTask("follow", path=CIRCLE, fields={"corridor": 1.0}, dtype=torch.float64)
+    task = TorchTask("follow", path=CIRCLE, corridor=1.0, dtype=torch.float64)
     start, _ = task.begin(torch.arange(2))
     _, _, start = rollout(task, start, [torch.tensor([[0.3, 0.0] * 3] * 2, dtype=torch.float64)] * 20)
     start = start.detached()
@@ -154,7 +154,7 @@ def test_no_gradient_passes_a_restart_or_a_detached_state(task):
 
 def test_robots_at_their_reference_without_motion_have_finite_gradients():
     """Distances of zero, rates of zero, equal motors: no root or quotient of zero makes a gradient no number."""
-    task = TorchTask("track", path=CIRCLE, fields={"start_offset": 0.0, "start_turn": 0.0}, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, start_offset=0.0, start_turn=0.0, dtype=torch.float64)
     state, _ = task.begin(torch.arange(2))
     bodies = state.bodies.clone().requires_grad_()
     actions = torch.zeros((2, 6), dtype=torch.float64, requires_grad=True)
@@ -168,7 +168,7 @@ def test_robots_at_their_reference_without_motion_have_finite_gradients():
 def before_a_wall():
     """A task in a room, and a robot on its way straight into one wall."""
     arena = {"room": [[-1.0, -1.0], [1.0, 1.0]], "restitution": 0.6, "friction": 0.2}
-    task = TorchTask("track", path=CIRCLE, arena=arena, fields={"corridor": 5.0}, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, arena=arena, corridor=5.0, dtype=torch.float64)
     state, _ = task.begin(torch.arange(1))
     bodies = state.bodies.clone()
     bodies[:, 0] = torch.tensor([0.89, 0.1, 1.0, 0.0, 0.8, 0.15, 0.1, *[1.0, 0.0] * 3], dtype=torch.float64)

@@ -155,7 +155,7 @@ def test_parts_of_steps_are_refused(steps):
         CasterTrackVectorEnv,
         CasterFollowVectorEnv,
         TorchVectorEnv,
-        lambda **given: TorchTask("follow", fields=given),
+        TorchTask,
         lambda **given: SB3VecEnv(CasterTrackVectorEnv(1, autoreset_mode="SameStep"), **given),
         lambda **given: gym.make("caster_gym:CasterTrack-v0", **given),
         lambda **given: gym.make_vec("caster_gym:CasterFollow-v0", num_envs=2, **given),

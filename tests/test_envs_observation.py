@@ -68,6 +68,10 @@ PAIR = (1.0, 1.0)
             [Channel("mine", lambda view: view.errors.ahead, (1.0,), "")],
             r"'mine' .* gives a float, and must give a tuple",
         ),
+        (
+            [Channel("mine", directions, PAIR, "", "casters")],  # type: ignore[arg-type]
+            r"'mine' of the observation is per='casters', which must be one of \"robot\", \"caster\", \"point\", \"obst",
+        ),
         ([*CHANNELS, CHANNELS[0]], r"the observation has 2 channels 'position_error': each needs a name of its own"),
     ],
 )

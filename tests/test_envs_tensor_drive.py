@@ -26,7 +26,7 @@ def test_a_wrench_pushes_the_robot():
 @pytest.mark.parametrize("floor", ["grip", ISLANDS])
 def test_substeps_one_by_one_are_all_of_them_at_once(floor):
     """To the last bit: one by one where a gradient is wanted, so that the compiler has less to look at."""
-    task = TorchTask("track", path=CIRCLE, fields={"floor": floor}, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, floor=floor, dtype=torch.float64)
     state, _ = task.begin(torch.arange(3))
     actions = torch.full((3, 6), 0.3)
     at_once, _ = task.step(state, actions)
@@ -63,7 +63,7 @@ def test_single_precision_stays_within_a_millimetre():
 @pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
 def test_gradients_pass_and_are_those_of_differences(dtype):
     """From slips and poses, where wheels slide and where they stand still at first, back to the actions."""
-    task = TorchTask("track", path=CIRCLE, fields={"floor": {"friction": 0.3}, "corridor": 5.0}, dtype=dtype)
+    task = TorchTask("track", path=CIRCLE, floor={"friction": 0.3}, corridor=5.0, dtype=dtype)
     start, _ = task.begin(torch.arange(3))
 
     def outcome(actions):
@@ -85,7 +85,7 @@ def test_gradients_pass_and_are_those_of_differences(dtype):
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
 def test_each_part_is_one_graph_for_the_compiler_on_every_floor(part):
-    task = TorchTask("track", path=CIRCLE, fields={"floor": ISLANDS}, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, floor=ISLANDS, dtype=torch.float64)
     state, _ = task.begin(torch.arange(3))
     actions = torch.full((3, 6), 0.3)
     expected, _ = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
@@ -96,7 +96,7 @@ def test_each_part_is_one_graph_for_the_compiler_on_every_floor(part):
 
 def test_numbers_of_the_robots_may_be_replaced():
     """Each robot on a floor of its own: the friction is one of a robot's numbers."""
-    task = TorchTask("track", path=CIRCLE, fields={"floor": {"friction": 0.7}}, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, floor={"friction": 0.7}, dtype=torch.float64)
     frictions = torch.tensor([0.7, 0.01], dtype=torch.float64)
     task.parameters = task.parameters._replace(platform=task.parameters.platform._replace(floor_friction=frictions))
     state, _ = task.begin(torch.zeros(2, dtype=torch.int64))

@@ -34,7 +34,7 @@ def test_rewards_are_the_sum_of_the_terms_that_are_reported():
 
 
 def test_time_is_over_with_the_last_period_of_the_path():
-    task = TorchTask("track", path=CIRCLE, fields={"corridor": 50.0})
+    task = TorchTask("track", path=CIRCLE, corridor=50.0)
     state, _ = task.begin(torch.arange(2))
     last = len(task.engine.plan.tables[0]) - 1  # control periods
     state = state._replace(clocks=torch.tensor([last - 2, last - 1]))

@@ -120,7 +120,7 @@ def test_at_rest_only_the_place_is_left():
 
 def test_arriving_counts_as_progress_on_the_last_point():
     """A rational kernel of the distance."""
-    last = (3.0, -1.0) + (0.0,) * 8
+    last = course.Row(3.0, -1.0, *(0.0,) * 8)
     assert course.arrived_share(3.0, -1.0, last, 0.02) == 1.0
     assert course.arrived_share(3.012, -1.016, last, 0.02) == pytest.approx(0.5, abs=1e-12)  # rounding of 3 m
     assert course.arrived_share(5.0, -1.0, last, 0.02) < 1e-3

@@ -109,7 +109,7 @@ def test_a_batch_is_equal_to_single_environments_bit_for_bit():
 def test_tensors_do_the_same():
     """In double precision, up to rounding of 100 steps; observations in single precision."""
     batch = CasterHoldVectorEnv(4, target=TARGET, arena={"room": [[-1.0, -1.0], [3.0, 3.0]]})
-    task = TorchTask("hold", arena={"room": [[-1.0, -1.0], [3.0, 3.0]]}, fields={"target": TARGET}, dtype=torch.float64)
+    task = TorchTask("hold", arena={"room": [[-1.0, -1.0], [3.0, 3.0]]}, target=TARGET, dtype=torch.float64)
     seen, _ = batch.reset(seed=2)
     keys = torch.tensor([int(gym.utils.seeding.np_random(2 + i)[0].integers(2**63)) for i in range(4)])
     state, outcome = task.begin(keys)

@@ -14,6 +14,7 @@ from caster_gym.agents.comparison.evaluation import Batch, bare, make_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.keyboard import KeyboardDriver, keys_of_window
 from caster_gym.agents.control.protocol import Agent
+from caster_gym.envs.plan import SPAN
 from caster_gym.envs.scene import Scene
 from caster_gym.paths.naming import unknown_name
 from caster_gym.render.recording import check_target, recording
@@ -66,7 +67,7 @@ def watch(
     else:
         controller = choose_agent(agent, settings, batch).agent
     end = np.inf if seconds is None else round(seconds / period)
-    longest = np.inf if driving else int(engine.plan.source.spans[paths, 2].max())
+    longest = np.inf if driving else int(engine.plan.source.spans[paths, SPAN.periods].max())
     mode = "rgb_array" if save is not None and not driving else "human"
     around = SURROUNDINGS * engine.robot.reach if driving else None
     with ExitStack() as stack:

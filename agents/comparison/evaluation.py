@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from caster_gym.agents.comparison.task_settings import Paths, TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.arrays import Array
+from caster_gym.envs.plan import SPAN
 from caster_gym.tasks.environment import TaskVectorEnv
 from caster_gym.tasks.episodes import Episodes
 from caster_gym.tasks.registry import find_task
@@ -93,7 +94,7 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
         **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
         driven=driven,
         failed=failed,
-        allowed=plan.source.spans[path, 2],
+        allowed=plan.source.spans[path, SPAN.periods],
         facts={name: values[path] for name, values in plain.definition.facts(plan).items()},
     )
 

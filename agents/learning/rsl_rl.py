@@ -13,6 +13,7 @@ from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.settings import RslPPOSettings, scheduled
 from caster_gym.agents.learning.tensors import torch_fields
 from caster_gym.agents.learning.training_run import Run
+from caster_gym.envs.plan import SPAN
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
 
 try:
@@ -33,7 +34,7 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
         self.batch, self.cfg = batch, {"seed": seed}
         self.num_envs, self.device = batch.num_envs, batch.device
         (self.num_actions,) = batch.single_action_space.shape
-        self.max_episode_length = int(batch.task.engine.plan.source.spans[:, 2].max())
+        self.max_episode_length = int(batch.task.engine.plan.source.spans[:, SPAN.periods].max())
         self._lengths = torch.zeros(self.num_envs, dtype=torch.int64, device=self.device)
         self._seen, _ = batch.reset(seed=seed)
 

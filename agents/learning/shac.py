@@ -183,11 +183,11 @@ def make_task(task: TaskSettings, settings: SHACSettings) -> TorchTask:
     check_compiler(settings)
     return TorchTask(
         task.environment,
-        fields={**task.task.model_dump(), "substeps": settings.substeps or _fewest_substeps(task)},
         device=settings.device,
         compile=settings.compile,
         diagnostics=False,
         **torch_fields(task),
+        **{**task.task.model_dump(), "substeps": settings.substeps or _fewest_substeps(task)},
     )
 
 

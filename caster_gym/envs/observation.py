@@ -204,7 +204,11 @@ _PROBED = {"robot": 1, "caster": 2, "point": 3, "obstacle": 4}  # items, as many
 
 
 def check_channels(channels: tuple[Channel, ...]) -> None:
-    """Refuse two channels of one name, and one that does not give a number for each of its units. Raises TypeError."""
+    """Refuse channels that would shift or hide others.
+
+    Raises TypeError for two of one name, one that is per something else than `Item` names, and one that does not give a
+    number for each of its units.
+    """
     robot = RobotParameters(
         PlatformParameters(*(1.0,) * PLATFORM_FIELDS), (CasterParameters(*(1.0,) * CASTER_FIELDS),) * 2
     )
@@ -217,6 +221,9 @@ def check_channels(channels: tuple[Channel, ...]) -> None:
         name, units, function = channel.name, len(channel.units), f"its function {channel.see.__name__} gives"
         if names.count(name) > 1:
             raise TypeError(f"the observation has {names.count(name)} channels {name!r}: each needs a name of its own")
+        if channel.per not in _PROBED:
+            words = ", ".join(f'"{item}"' for item in _PROBED)
+            raise TypeError(f"channel {name!r} of the observation is per={channel.per!r}, which must be one of {words}")
         seen: object = channel.see(view)
         if not isinstance(seen, tuple):
             raise TypeError(

@@ -6,8 +6,27 @@ from typing import Any, Literal, NamedTuple, Protocol, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from caster_gym.envs.rows import numbered
 from caster_gym.floor import Floor
 from caster_gym.mechanics.separation import Surroundings
+
+
+class Span(NamedTuple):
+    """Where a path stands among the rows of its source, and how long an episode on it takes."""
+
+    first: Any  # row
+    last: Any
+    periods: Any  # control periods of an episode
+
+
+class Beside(NamedTuple):
+    """Which obstacles are beside a path."""
+
+    first: Any
+    end: Any
+
+
+SPAN, BESIDE = numbered(Span), numbered(Beside)
 
 PlaceName: TypeAlias = Literal["time", "progress"]
 
@@ -27,7 +46,7 @@ class ReferenceSource(Protocol):
 
     @property
     def spans(self) -> NDArray[np.int64]:
-        """(paths, 3): first and last row, control periods of an episode."""
+        """(paths, 3) as in `Span`."""
         ...
 
     @property
@@ -48,7 +67,7 @@ class Plan(NamedTuple):
     tables: tuple[NDArray[np.float64], ...]  # (K, 10) samples of each path, x and y first
     terms: tuple[str, ...]  # names of the reward's terms
     around: Surroundings
-    arenas: NDArray[np.int64]  # (paths, 2) first and end of the obstacles beside each path
+    arenas: NDArray[np.int64]  # (paths, 2) as in `Beside`
     descriptions: tuple[str, ...]  # what was made of each path
 
     def __deepcopy__(self, _memo: dict[int, Any]) -> Self:

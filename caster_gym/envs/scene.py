@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from caster_gym.arrays import Array
-from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.envs.report import REPORT, torque_rows
 from caster_gym.envs.rows import span
 from caster_gym.floor import Floor
@@ -13,7 +12,7 @@ from caster_gym.mechanics import ground
 from caster_gym.mechanics.dynamics import forward_dynamics
 from caster_gym.mechanics.floor import floor_table, wheel_frictions
 from caster_gym.mechanics.free_casters import slip_velocity
-from caster_gym.mechanics.integration import unpack_state
+from caster_gym.mechanics.integration import State, unpack_state
 from caster_gym.mechanics.motors import joint_torques
 from caster_gym.mechanics.parameters import robot_parameters
 from caster_gym.mechanics.scalars import each, pairs
@@ -68,17 +67,18 @@ def draw_scene(
     time_step [s]: of the task.
     """
     n = robot.caster_count
+    now = (unpack_state if floor is None else unpack_slip_state)(tuple(state.tolist()))
     torque, push = report[torque_rows(terms, n)], wrench + report[_HELD]
     if floor is None:
-        forces, slip = _ground_forces(robot, state, torque, push), np.zeros((n, 2))
+        forces, slip = _ground_forces(robot, now, torque, push), np.zeros((n, 2))
     else:
-        forces, slip = _slipping_forces(robot, state, torque, push, floor, time_step)
+        forces, slip = _slipping_forces(robot, now, torque, push, floor, time_step)
     return Scene(
         robot=robot,
         time=time,
-        pose=state[:4],
-        twist=state[4:7],
-        directions=state[BODY_ROWS : BODY_ROWS + 2 * n].reshape(-1, 2),
+        pose=np.array(now.position + now.heading),
+        twist=np.array(now.twist),
+        directions=np.array(now.directions),
         torque=torque,
         ground_forces=forces,
         path=path,
@@ -93,9 +93,9 @@ def draw_scene(
     )
 
 
-def _ground_forces(robot: Robot, state: Array, torque: Array, push: Array) -> Array:
+def _ground_forces(robot: Robot, now: State, torque: Array, push: Array) -> Array:
     """Forces (N, 2) of the floor on each wheel along its rolling direction and to its left. [N]"""
-    parameters, now = robot_parameters(robot), unpack_state(tuple(state.tolist()))
+    parameters = robot_parameters(robot)
     at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
     x, y, moment = push.tolist()
     rate = forward_dynamics(now.twist, now.directions, at_joints, (x, y, moment), parameters)
@@ -104,10 +104,10 @@ def _ground_forces(robot: Robot, state: Array, torque: Array, push: Array) -> Ar
 
 
 def _slipping_forces(
-    robot: Robot, state: Array, torque: Array, push: Array, floor: Floor, time_step: float
+    robot: Robot, now: State, torque: Array, push: Array, floor: Floor, time_step: float
 ) -> tuple[Array, Array]:
     """The same on a floor of finite friction, mean over the coming time step; and how wheels slip now (N, 2) [m/s]."""
-    parameters, now = robot_parameters(robot), unpack_slip_state(tuple(state.tolist()))
+    parameters = robot_parameters(robot)
     at_joints = each(joint_torques, (), pairs(tuple(torque.tolist())), parameters.casters)
     x, y, moment = push.tolist()
     frictions = wheel_frictions(now.position, now.heading, now.directions, floor_table(floor).patches, parameters)

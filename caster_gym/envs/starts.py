@@ -12,18 +12,17 @@ from numpy.typing import NDArray
 
 from caster_gym.arena.clearance import ROUNDING
 from caster_gym.arrays import Array
-from caster_gym.engines.native.lanes import BODY_ROWS
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.inputs import checked_numbers, checked_options
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
-from caster_gym.envs.plan import PlaceName
+from caster_gym.envs.plan import PlaceName, Span
 from caster_gym.envs.randomness import episode_seed, uniforms
 from caster_gym.envs.report import REPORT
 from caster_gym.envs.rows import span
 from caster_gym.envs.tracking import Reference, start
-from caster_gym.mechanics.integration import pack_state, unpack_state
+from caster_gym.mechanics.integration import State, pack_state, unpack_state
 from caster_gym.mechanics.parameters import unpack_parameters
-from caster_gym.mechanics.slip_state import rolling_state
+from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 from caster_gym.paths.trajectory import rounded_down
 from caster_gym.robot import Robot
 
@@ -101,35 +100,37 @@ def restart_at(
 
 def _put(engine: TaskEngine, selected: NDArray[np.int64], wanted: Start) -> None:
     """Put robots that have just been drawn a start where it is wanted."""
-    states = engine.states[selected]
+    state = _states(engine, selected)
     if wanted.place is not None:
         _move_along(engine, selected, wanted.place)
-        states[:, :4] = _drawn_pose(engine, selected)
+        drawn = _drawn_pose(engine, selected)
+        state = state._replace(position=drawn.position, heading=drawn.heading)
     if wanted.pose is not None:
-        states[:, :2] = wanted.pose[:, :2]
-        states[:, 2], states[:, 3] = np.cos(wanted.pose[:, 2]), np.sin(wanted.pose[:, 2])
+        x, y, heading = wanted.pose.T
+        state = state._replace(position=(x, y), heading=(np.cos(heading), np.sin(heading)))
     if wanted.twist is not None:
-        states[:, 4:7] = wanted.twist
-    end = BODY_ROWS + 2 * engine.robot.caster_count
-    cos, sin = states[:, BODY_ROWS:end:2], states[:, BODY_ROWS + 1 : end : 2]
+        state = state._replace(twist=tuple(wanted.twist.T))
     if wanted.steering is not None:
-        cos[:], sin[:] = np.cos(wanted.steering), np.sin(wanted.steering)
+        cos, sin = np.cos(wanted.steering), np.sin(wanted.steering)
+        state = state._replace(directions=tuple(zip(cos.T, sin.T, strict=True)))
     if wanted.twist is not None:
-        check_motion(engine.robot, np.arctan2(sin, cos), wanted.twist)
+        steering = np.stack([np.arctan2(s, c) for c, s in state.directions], axis=1)
+        check_motion(engine.robot, steering, wanted.twist)
     if engine.slipping:
-        states[:, end:] = rolling(states[:, :end], engine.parameters[selected])
-    engine.put(selected, states)
+        state = rolling_state(state, unpack_parameters(tuple(engine.parameters[selected].T)))
+    _put_states(engine, selected, state)
     if wanted.pose is not None and wanted.place is None and engine.plan.source.place == "progress":
         _find_place(engine, selected, wanted.pose[:, :2])
 
 
-def rolling(states: Array, parameters: Array) -> Array:
-    """Numbers (robots, 2 N + 2) behind those of states (robots, 7 + 2 N) in which no wheel slips yet.
+def _states(engine: TaskEngine, selected: NDArray[np.int64]) -> State:
+    """States of some robots, as one of arrays (selected,)."""
+    unpack = unpack_slip_state if engine.slipping else unpack_state
+    return unpack(tuple(engine.states[selected].T))
 
-    parameters (robots, fields): of each robot.
-    """
-    state = rolling_state(unpack_state(tuple(states.T)), unpack_parameters(tuple(parameters.T)))
-    return np.stack(pack_state(state)[states.shape[1] :], axis=1)
+
+def _put_states(engine: TaskEngine, selected: NDArray[np.int64], state: State) -> None:
+    engine.put(selected, np.stack(pack_state(state), axis=1))
 
 
 def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -> None:
@@ -144,7 +145,8 @@ def _move_along(engine: TaskEngine, selected: NDArray[np.int64], place: Array) -
 def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> Array:
     """Places (robots,) on paths (robots,), in range in spite of rounding. Raises ValueError for ones that are not."""
     source: Any = engine.plan.source
-    name, unit, rows = source.place, "s", source.spans[paths, 1] - source.spans[paths, 0]
+    span = Span(*source.spans[paths].T)
+    name, unit, rows = source.place, "s", span.last - span.first
     most = (rows - 1) * engine.control_period  # at least one control period is left
     if name == "progress":
         unit, most = "m", rows * source.spacings[paths]
@@ -159,29 +161,26 @@ def check_place(engine: TaskEngine, paths: NDArray[np.int64], place: Array) -> A
 
 def check_longest(engine: TaskEngine) -> None:
     """Refuse a time on trajectories that episodes are too short for, where clocks start at zero. Raises ValueError."""
-    first, last, longest = engine.plan.source.spans.T
-    if (longest < last - first).any():
+    span = Span(*engine.plan.source.spans.T)
+    if (span.periods < span.last - span.first).any():
         raise ValueError(
             "options['time'] cannot be given where max_episode_steps ends episodes before their trajectory: leave one "
             "of them away"
         )
 
 
-def _drawn_pose(engine: TaskEngine, selected: NDArray[np.int64]) -> Array:
-    """Poses (selected, 4) beside the places where robots have been put, displaced as at the start of their paths."""
-    states = engine.states
-    headless = states[selected]
-    headless[:, 2:4] = 0.0  # a robot without a heading is shown the path's own, even where it is free
-    engine.put(selected, headless)
+def _drawn_pose(engine: TaskEngine, selected: NDArray[np.int64]) -> State:
+    """Poses beside the places where robots have been put, displaced as at the start of their paths."""
+    none = np.zeros(len(selected))
+    headless = _states(engine, selected)._replace(heading=(none, none))
+    _put_states(engine, selected, headless)  # a robot without a heading is shown the path's own, even where it is free
     x, y, cos, sin = engine.look().reports[span(REPORT.reference_pose), selected]
     keys, coming = engine.episodes(selected)
     seeds = episode_seed(keys, coming - np.uint64(1))
     sides, forth, turns = (2.0 * uniforms(seeds, np.arange(1, 4)) - 1.0).T.copy()
     offset, turn = engine.spread
-    none = np.zeros_like(x)
     reference = Reference(x, y, cos, sin, none, none, none, none, none, none)
-    placed = start(reference, (sides * offset, forth * offset), (np.cos(turns * turn), np.sin(turns * turn)), ())
-    return np.stack((*placed.position, *placed.heading), axis=1)
+    return start(reference, (sides * offset, forth * offset), (np.cos(turns * turn), np.sin(turns * turn)), ())
 
 
 def _find_place(engine: TaskEngine, selected: NDArray[np.int64], points: Array) -> None:

@@ -8,7 +8,7 @@ and free of roots and exponentials.
 from typing import Any, NamedTuple
 
 from caster_gym.envs.report import Deviation, Endings, Pose, Record, Report, Situation
-from caster_gym.envs.rows import check_names
+from caster_gym.envs.rows import check_names, numbered, span
 from caster_gym.mechanics.actuation import conditioning
 from caster_gym.mechanics.integration import State, difference, pack_state
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
@@ -44,8 +44,15 @@ class Point(NamedTuple):
 
 
 REFERENCE_ROWS, POINT_ROWS = len(Reference._fields), len(Point._fields)
+REFERENCE = numbered(Reference)
+POSE = span((REFERENCE.x, REFERENCE.y, REFERENCE.cos, REFERENCE.sin))  # of a trajectory's columns
 check_names(Reference._fields, "the fields of Reference", COLUMNS, "the columns of a Trajectory")
 check_names(Point._fields, "the fields of Point", Reference._fields[:POINT_ROWS], "the first of Reference")
+
+
+def point_of(reference: Reference) -> Point:
+    """Where a reference is and how fast it moves."""
+    return Point(*reference[:POINT_ROWS])
 
 
 class Errors(NamedTuple):

@@ -15,7 +15,7 @@ from caster_gym.mechanics.parameters import (
     caster_parameters,
     robot_parameters,
 )
-from caster_gym.mechanics.scalars import Direction, Scalar, each, entry, where
+from caster_gym.mechanics.scalars import Direction, Scalar, each, entries, where
 from caster_gym.robot import Robot
 
 
@@ -26,16 +26,28 @@ class Surface(NamedTuple):
     contact_time: Scalar  # [s]
 
 
+class PatchRow(NamedTuple):
+    """A disc of another friction."""
+
+    x: Scalar  # [m] its centre, in W
+    y: Scalar
+    square_radius: Scalar  # [m²]
+    friction: Scalar
+
+
+_PLACES = tuple(range(len(PatchRow._fields)))
+
+
 class FloorTable(NamedTuple):
     """A floor as the engines take it; the friction away from patches is the robot's."""
 
     contact_time: Scalar  # [s]
-    patches: Any  # (P, 4) x, y [m], radius² [m²], friction; None if there are none
+    patches: Any  # (P, 4) as in `PatchRow`; None if there are none
 
 
 def floor_table(floor: Floor) -> FloorTable:
     """The numbers of a floor."""
-    rows = [(patch.x, patch.y, patch.radius * patch.radius, patch.friction) for patch in floor.patches]
+    rows = [PatchRow(patch.x, patch.y, patch.radius * patch.radius, patch.friction) for patch in floor.patches]
     return FloorTable(floor.contact_time, np.array(rows) if rows else None)
 
 
@@ -113,19 +125,24 @@ def own_friction(friction: Scalar, caster: CasterParameters) -> Scalar:
     return friction + 0.0 * caster.x
 
 
+def patch_at(patches: Any, k: Any) -> PatchRow:
+    """One of the patches of a table."""
+    return PatchRow(*entries(patches, k, _PLACES))
+
+
 def patch_friction(
     position: tuple[Scalar, Scalar],
     heading: Direction,
-    patch: tuple[Scalar, Scalar, Scalar, Scalar],
+    patch: PatchRow,
     friction: Scalar,
     f: Direction,
     caster: CasterParameters,
 ) -> Scalar:
     """Friction under one wheel: that of a patch if it stands on it, else as it is. [-]"""
     (c, s), (px, py) = heading, wheel_centre(f, caster)
-    x = position[0] + c * px - s * py - patch[0]
-    y = position[1] + s * px + c * py - patch[1]
-    return where(x * x + y * y < patch[2], patch[3] + 0.0 * friction, friction)
+    x = position[0] + c * px - s * py - patch.x
+    y = position[1] + s * px + c * py - patch.y
+    return where(x * x + y * y < patch.square_radius, patch.friction + 0.0 * friction, friction)
 
 
 def wheel_frictions(
@@ -140,6 +157,6 @@ def wheel_frictions(
     if patches is None:
         return frictions
     for k in range(len(patches)):
-        patch = (entry(patches, k, 0), entry(patches, k, 1), entry(patches, k, 2), entry(patches, k, 3))
-        frictions = each(patch_friction, (position, heading, patch), frictions, directions, robot.casters)
+        shared = position, heading, patch_at(patches, k)
+        frictions = each(patch_friction, shared, frictions, directions, robot.casters)
     return frictions

@@ -22,10 +22,24 @@ class State(NamedTuple):
     tilt: tuple[Scalar, ...] = ()  # [N m] x and y in B, by which inertia shifted the loads on the wheels just before
 
 
+def state_at_rest(casters: int) -> State:
+    """A state at the origin in which everything points along x, of a robot whose wheels roll without slip."""
+    return State((0.0, 0.0), (1.0, 0.0), (0.0, 0.0, 0.0), ((1.0, 0.0),) * casters)
+
+
 def pack_state(state: State) -> tuple[Scalar, ...]:
     """(x, y, cos β, sin β, vx, vy, ω, cos δ_1, sin δ_1, …), and if wheels may slip η̇_1, θ̇_1, …, the tilt."""
     body = state.position + state.heading + state.twist
     return body + flatten(state.directions) + flatten(state.rates) + state.tilt
+
+
+BODY_ROWS = len(pack_state(state_at_rest(0)))  # numbers of a state before the casters' directions
+
+
+def state_rows(casters: int, slips: bool) -> int:
+    """How many numbers `pack_state` gives of a robot with so many casters, whose wheels may slip or not."""
+    rolling = BODY_ROWS + 2 * casters
+    return rolling + 2 * casters + 2 if slips else rolling
 
 
 def difference(number: Scalar) -> tuple[Scalar]:
@@ -35,7 +49,7 @@ def difference(number: Scalar) -> tuple[Scalar]:
 
 def unpack_state(flat: tuple[Scalar, ...]) -> State:
     """Inverse of `pack_state` for wheels that roll without slip."""
-    return State((flat[0], flat[1]), (flat[2], flat[3]), (flat[4], flat[5], flat[6]), pairs(flat[7:]), (), ())
+    return State((flat[0], flat[1]), (flat[2], flat[3]), (flat[4], flat[5], flat[6]), pairs(flat[BODY_ROWS:]), (), ())
 
 
 def pair_where(condition: Scalar, yes: Direction, no: Direction) -> Direction:

@@ -95,6 +95,11 @@ def entry(table: Any, i: Any, j: Any) -> Any:
     return table[i][j]
 
 
+def entries(table: Any, i: Any, places: tuple[int, ...]) -> tuple[Any, ...]:
+    """Numbers of row i of such a table, those in these places."""
+    return each(entry, (table, i), places[:])
+
+
 def memory(nothing: Scalar, count: int) -> Any:
     """Room for so many scalars of a kind, each `nothing` at first; entries are read and set by their index."""
     return [nothing] * count

@@ -2,7 +2,7 @@
 
 from caster_gym.mechanics.caster import rates
 from caster_gym.mechanics.free_casters import Pair, slip_velocity
-from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.integration import BODY_ROWS, State
 from caster_gym.mechanics.linear import rotate, shift_pair
 from caster_gym.mechanics.parameters import CasterParameters, RobotParameters
 from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, pairs
@@ -10,12 +10,12 @@ from caster_gym.mechanics.scalars import Direction, Scalar, Vector, each, pairs
 
 def unpack_slip_state(flat: tuple[Scalar, ...]) -> State:
     """Inverse of `pack_state` for wheels that may slip."""
-    half = (len(flat) + 5) // 2
+    half = (BODY_ROWS + len(flat) - 2) // 2  # directions and rates are as many
     return State(
         (flat[0], flat[1]),
         (flat[2], flat[3]),
         (flat[4], flat[5], flat[6]),
-        pairs(flat[7:half]),
+        pairs(flat[BODY_ROWS:half]),
         pairs(flat[half:-2]),
         (flat[-2], flat[-1]),
     )

@@ -18,7 +18,7 @@ from caster_gym.engines.time_step import check_time_step
 from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, check_keywords
 from caster_gym.envs.native.engine import TaskEngine
 from caster_gym.envs.observation import ObservationLayout
-from caster_gym.envs.plan import Pace, Plan
+from caster_gym.envs.plan import SPAN, Pace, Plan
 from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import check_slips, robot_on, with_greatest_friction
 from caster_gym.mechanics.separation import Surroundings
@@ -76,7 +76,7 @@ def _plan(
         raise OwnCodeError(f"lay_out of task {task.name!r} gives a {given}, and must give a {wanted}, its source")
     spans = source.spans.copy()
     if longest is not None:
-        spans[:, 2] = np.minimum(spans[:, 2], longest)
+        spans[:, SPAN.periods] = np.minimum(spans[:, SPAN.periods], longest)
     source = source._replace(spans=spans, weights=weights)
     around, arenas = _arenas(arena, robot, ways, parameters)
     names, tables = tuple(way.name for way in ways), tuple(way.table for way in ways)

@@ -1,5 +1,6 @@
-"""A task's reward and endings, called once with plain numbers: what is wrong with them is told before they compile."""
+"""A task's reward and endings, called once with numbers: what is wrong with them is told before they compile."""
 
+import math
 from collections.abc import Callable
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from caster_gym.envs.report import Endings, Record, Situation
 from caster_gym.envs.tracking import Errors, Moment, Reference
 from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.scalars import register
 from caster_gym.own_errors import OwnCodeError, place_of
 
 if TYPE_CHECKING:
@@ -44,6 +46,39 @@ def _check(task: "Task", name: str, function: Callable[[Any, Any], Any], kind: A
             raise OwnCodeError(f"{said} must give a number as {field!r}, and gives {value!r}")
 
 
+class _Tried(float):
+    """A number, or a condition as 1 or 0, that stands for one in each robot of a batch: it has no truth value."""
+
+    __hash__ = float.__hash__
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "conditions differ from robot to robot, and `if`, `and`, `or`, `not`, `min` and `max` take one for all: "
+            "write where, minimum, maximum, clip or absolute of caster_gym.mechanics.scalars"
+        )
+
+
+def _calculated(name: str) -> Callable[..., Any]:
+    operation: Callable[..., Any] = getattr(float, name)
+
+    def calculate(*numbers: Any) -> Any:
+        result = operation(*numbers)
+        return _Tried(result) if isinstance(result, float | bool) else result
+
+    return calculate
+
+
+_OPERATIONS = "lt le eq ne ge gt add radd sub rsub mul rmul truediv rtruediv pow rpow neg pos abs"
+for _name in _OPERATIONS.split():
+    setattr(_Tried, f"__{_name}__", _calculated(f"__{_name}__"))
+register(
+    _Tried,
+    lambda condition, yes, no: yes if float(condition) else no,
+    lambda x: _Tried(math.sqrt(x)),
+    lambda condition: float(condition) != 0.0,
+)
+
+
 def _tuple(kind: Any) -> str:
     fields = getattr(kind, "_fields", ())
     return f"{kind.__name__} ({', '.join(fields)})" if fields else f"a {kind.__name__}"
@@ -51,11 +86,12 @@ def _tuple(kind: Any) -> str:
 
 def _moment() -> Moment:
     """A robot on two casters that does something of everything."""
+    half, ahead = _Tried(0.5), (_Tried(0.6), _Tried(0.8))
     return Moment(
-        State((0.5, 0.5), (0.6, 0.8), (0.5, 0.5, 0.5), ((0.6, 0.8),) * 2, (), ()),
-        Reference(*(0.5,) * len(Reference._fields)),
-        Errors(*(0.5,) * len(Errors._fields)),
-        0.5,
-        Record(*(0.5,) * len(Record._fields)),
-        Situation(*(0.5,) * len(Situation._fields)),
+        State((half, half), ahead, (half, half, half), (ahead, ahead), (), ()),
+        Reference(*(half,) * len(Reference._fields)),
+        Errors(*(half,) * len(Errors._fields)),
+        half,
+        Record(*(half,) * len(Record._fields)),
+        Situation(*(half,) * len(Situation._fields)),
     )

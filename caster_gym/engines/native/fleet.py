@@ -23,7 +23,6 @@ from caster_gym.engines.native.fleet_rows import (
 )
 from caster_gym.engines.native.guarding import borrowed_floor, borrowed_hull, borrowed_obstacles, reach_of
 from caster_gym.engines.native.lanes import (
-    BODY_ROWS,
     LANES,
     block_count,
     from_lanes,
@@ -39,7 +38,7 @@ from caster_gym.floor import FloorLike, load_floor
 from caster_gym.mechanics.contact import guarded_step
 from caster_gym.mechanics.floor import floor_table, parameters_on, wrong_state
 from caster_gym.mechanics.grip_or_slip import free_step
-from caster_gym.mechanics.integration import pack_state, unpack_state
+from caster_gym.mechanics.integration import pack_state, state_at_rest, state_rows, unpack_state
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
     PLATFORM_FIELDS,
@@ -186,7 +185,8 @@ class Fleet:
         floor: FloorLike = None,
     ) -> None:
         if isinstance(robots, Robot):
-            check_memory(count or 1, BODY_ROWS + PLATFORM_FIELDS + (4 + CASTER_FIELDS) * robots.caster_count)
+            n = robots.caster_count
+            check_memory(count or 1, state_rows(n, False) + 2 * n + PLATFORM_FIELDS + CASTER_FIELDS * n)
         listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
         if not listed or (count is not None and len(listed) != count):
             raise ValueError(f"a fleet needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
@@ -214,10 +214,7 @@ class Fleet:
             friction = parameters[:, PlatformParameters._fields.index("floor_friction"), None]
             frictions = np.repeat(friction, len(self._casters), axis=1)
             to_lanes(frictions, self._blocks, friction_row(self._casters, self._floor))
-        at_rest = np.zeros((self.count, BODY_ROWS + 2 * len(self._casters)))
-        at_rest[:, 2] = 1.0
-        at_rest[:, BODY_ROWS::2] = 1.0
-        self.state = at_rest
+        self.state = np.tile(pack_state(state_at_rest(len(self._casters))), (self.count, 1))
 
     @property
     def state(self) -> Array:
@@ -226,14 +223,14 @@ class Fleet:
 
     @state.setter
     def state(self, value: ArrayLike) -> None:
-        state, rolling = np.asarray(value, dtype=np.float64), BODY_ROWS + 2 * len(self._casters)
+        state, rolling = np.asarray(value, dtype=np.float64), state_rows(len(self._casters), False)
         if self._floor is not None and state.shape == (self.count, rolling):
             state = self._rolling(self._checked("state", state, rolling))
         if state.shape != (self.count, self._torque_row):
             raise ValueError(wrong_state(state.shape, self.count, len(self._casters), self._floor is not None))
         state = self._checked("state", state, self._torque_row)
-        pairs = state[:, [2, 3, *range(BODY_ROWS, rolling)]].reshape(self.count, -1, 2)
-        length = np.hypot(pairs[..., 0], pairs[..., 1])
+        units = unpack_state(tuple(state[:, :rolling].T))
+        length = np.hypot(*np.array((units.heading, *units.directions)).T)  # (robots, 1 + N)
         if np.abs(length - 1.0).max() > 1e-6:
             raise ValueError(
                 f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}"

@@ -5,9 +5,9 @@ from typing import Any
 from numba.extending import register_jitable
 
 from caster_gym.engines.native.compiler import INLINE
-from caster_gym.engines.native.lanes import BODY_ROWS, read, read_robot, read_slip_state, read_state, write
-from caster_gym.mechanics.floor import Surface, own_friction, patch_friction
-from caster_gym.mechanics.integration import State
+from caster_gym.engines.native.lanes import read, read_robot, read_slip_state, read_state, write
+from caster_gym.mechanics.floor import Surface, own_friction, patch_at, patch_friction
+from caster_gym.mechanics.integration import State, state_rows
 from caster_gym.mechanics.scalars import each, either
 
 
@@ -15,8 +15,8 @@ from caster_gym.mechanics.scalars import each, either
 def torque_row(casters: Any, floor: Any) -> int:
     """First row of the joint torques, behind the state."""
     if floor is None:
-        return BODY_ROWS + 2 * len(casters)
-    return BODY_ROWS + 4 * len(casters) + 2
+        return state_rows(len(casters), False)
+    return state_rows(len(casters), True)
 
 
 @register_jitable(**INLINE)
@@ -84,7 +84,7 @@ def _look_at_patches(block: Any, lanes: Any, casters: Any, floor: Any, patches: 
         robot = read_robot(block, lane, parameters, casters)
         write(block, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
     for k in range(len(patches)):
-        patch = (patches[k, 0], patches[k, 1], patches[k, 2], patches[k, 3])
+        patch = patch_at(patches, k)
         for lane in range(lanes):  # neighbours side by side, a patch at a time
             state = read_slip_state(block, lane, 0, casters)
             robot = read_robot(block, lane, parameters, casters)

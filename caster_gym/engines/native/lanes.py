@@ -11,7 +11,7 @@ from numba.extending import overload, register_jitable
 
 from caster_gym.arrays import Array
 from caster_gym.engines.native.compiler import INLINE
-from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.integration import BODY_ROWS, State, state_rows
 from caster_gym.mechanics.parameters import (
     CASTER_FIELDS,
     PLATFORM_FIELDS,
@@ -22,7 +22,6 @@ from caster_gym.mechanics.parameters import (
 from caster_gym.mechanics.scalars import each
 
 LANES = 32
-BODY_ROWS = 7  # of a state before the casters' directions
 
 _PLATFORM = (0.0,) * PLATFORM_FIELDS
 _CASTER = (0.0,) * CASTER_FIELDS
@@ -136,10 +135,10 @@ def read_state(block: Any, lane: Any, row: Any, casters: Any) -> State:
 @register_jitable(**INLINE)
 def read_slip_state(block: Any, lane: Any, row: Any, casters: Any) -> State:
     """State of one robot whose wheels may slip."""
-    count = len(casters)
     body = read_state(block, lane, row, casters)
-    rates = read_pairs(block, lane, row + BODY_ROWS + 2 * count, casters)
-    tilt = read(block, lane, row + BODY_ROWS + 4 * count, (0.0, 0.0))
+    behind = row + state_rows(len(casters), False)
+    rates = read_pairs(block, lane, behind, casters)
+    tilt = read(block, lane, behind + 2 * len(casters), (0.0, 0.0))
     return State(body.position, body.heading, body.twist, body.directions, rates, tilt)
 
 

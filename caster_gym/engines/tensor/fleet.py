@@ -20,13 +20,12 @@ from caster_gym.engines.time_step import check_fleet, follows, longest_of_robots
 from caster_gym.floor import FloorLike, load_floor
 from caster_gym.mechanics.floor import FloorTable, check_floor, floor_table, on_floor, surface_under, wrong_state
 from caster_gym.mechanics.grip_or_slip import free_step
-from caster_gym.mechanics.integration import pack_state, unpack_state
+from caster_gym.mechanics.integration import pack_state, state_at_rest, state_rows, unpack_state
 from caster_gym.mechanics.parameters import Dynamics, RobotParameters, robot_parameters
 from caster_gym.mechanics.scalars import pairs
 from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 from caster_gym.robot import Robot
 
-BODY_ROWS = 7  # of a state before the casters' directions
 _NO_WRENCH = (0.0, 0.0, 0.0)
 
 
@@ -68,15 +67,15 @@ class TorchFleet:
     ) -> None:
         self.dtype, self.device = checked_dtype(dtype), checked_device(device)
         if count is not None:
-            check_memory(count, 4 * BODY_ROWS, self.dtype, self.device)
+            check_memory(count, 4 * state_rows(0, False), self.dtype, self.device)
         self.robots = listed_robots(robots, count)
         self.count = len(self.robots)
         self._distinct = list({id(robot): robot for robot in self.robots}.values())
         self._longest = float(longest_of_robots(self._distinct).min())
         n = self._distinct[0].caster_count
-        self._torque_rows, self._rolling_rows = 2 * n, BODY_ROWS + 2 * n
+        self._torque_rows, self._rolling_rows = 2 * n, state_rows(n, False)
         below = load_floor(floor)
-        self._rows = self._rolling_rows if below is None else self._rolling_rows + 2 * n + 2
+        self._rows = state_rows(n, below is not None)
         if parameters is not None:
             self._parameters = parameters
         elif len(self._distinct) == 1:
@@ -91,10 +90,9 @@ class TorchFleet:
         self._step: Callable[..., Any] = compiled(_step, self.device, self.device.type == "cuda") if compile else _step
         if compile and self.device.type == "cuda":
             self._step = replayed(self._step)
-        at_rest = torch.zeros((self._rows, self.count), dtype=self.dtype, device=self.device)
-        at_rest[2] = 1.0
-        at_rest[BODY_ROWS : self._rolling_rows : 2] = 1.0
-        self._state = at_rest
+        self._state = torch.zeros((self._rows, self.count), dtype=self.dtype, device=self.device)
+        at_rest = torch.tensor(pack_state(state_at_rest(n)), dtype=self.dtype, device=self.device)
+        self._state[: len(at_rest)] = at_rest[:, None]
 
     @property
     def state(self) -> Tensor:

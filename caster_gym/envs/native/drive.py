@@ -20,17 +20,16 @@ from caster_gym.engines.native.lanes import (
     read_state,
     write,
 )
-from caster_gym.envs.native.layout import Sizes, World, rows_of
-from caster_gym.envs.report import RECORD, Record, record_of
-from caster_gym.mechanics.floor import FloorTable, Surface, own_friction, patch_friction
+from caster_gym.envs.native.layout import CLOCKS, NO_WRENCH, Sizes, World, read_record, rows_of, write_record
+from caster_gym.envs.plan import BESIDE
+from caster_gym.envs.report import RECORD, record_of
+from caster_gym.mechanics.floor import FloorTable, Surface, own_friction, patch_at, patch_friction
 from caster_gym.mechanics.integration import State, pack_state
 from caster_gym.mechanics.plant import driven_step, guarded_driven_step, slip_speeds
 from caster_gym.mechanics.room import should_measure, step_within_room
 from caster_gym.mechanics.scalars import add, each, either, flatten, maximum
 from caster_gym.mechanics.separation import Hull, Obstacles, clearance
 from caster_gym.mechanics.slip_state import rolling_state
-
-_RECORD = (0.0,) * len(RECORD)
 
 
 @register_jitable(**INLINE)
@@ -47,8 +46,8 @@ def _add_up(workspace: Any, lane: Any, row: Any, more: Any) -> None:
 @register_jitable(**INLINE)
 def neighbourhood(robot: Any, world: World) -> Any:
     """First and end of the obstacles that a robot may meet."""
-    path = world.clocks[1, robot]
-    return world.arenas[path, 0], world.arenas[path, 1]
+    path = world.clocks[CLOCKS.path, robot]
+    return world.arenas[path, BESIDE.first], world.arenas[path, BESIDE.end]
 
 
 @register_jitable(**INLINE)
@@ -59,7 +58,7 @@ def _measure(workspace: Any, first: Any, here: Any, obstacles: Any, world: World
         return
     row = rows.room
     for lane in range(here):
-        state = read_state(workspace, lane, 0, sizes.casters)
+        state = read_state(workspace, lane, rows.state, sizes.casters)
         if should_measure(workspace[row * LANES + lane], state.twist, world.time_step, world.hull.reach):
             near, end = neighbourhood(first + lane, world)
             gap = clearance(state.position, state.heading, world.hull, obstacles, near, end)
@@ -94,7 +93,7 @@ def drive(workspace: Any, first: Any, lanes: Any, here: Any, world: World, sizes
         for lane in range(lanes):
             state = state_of(workspace, lane, world.floor, sizes)
             commands = read_pairs(workspace, lane, rows.commands, sizes.casters)
-            wrench = read(workspace, lane, rows.wrench, (0.0, 0.0, 0.0))
+            wrench = read(workspace, lane, rows.wrench, NO_WRENCH)
             robot = read_robot(workspace, lane, rows.parameters, sizes.casters)
             surface = surface_of(workspace, lane, world.floor, sizes)
             target, done = driven_step(state, commands, wrench, h, robot, surface)
@@ -127,14 +126,14 @@ def _careful_step(
     hull, obstacles = borrowed_hull(hull), borrowed_obstacles(obstacles)
     state = state_of(workspace, lane, floor, sizes)
     commands = read_pairs(workspace, lane, rows.commands, sizes.casters)
-    wrench = read(workspace, lane, rows.wrench, (0.0, 0.0, 0.0))
+    wrench = read(workspace, lane, rows.wrench, NO_WRENCH)
     robot = read_robot(workspace, lane, rows.parameters, sizes.casters)
     surface = surface_of(workspace, lane, floor, sizes)
     state, drive, touch = guarded_driven_step(state, commands, wrench, h, robot, hull, obstacles, near, end, surface)
     write(workspace, lane, rows.state, pack_state(state))
     _add_up(workspace, lane, rows.torques, each(_scaled, (share,), flatten(drive.torques)))
-    done = Record(*read(workspace, lane, rows.record, _RECORD))
-    write(workspace, lane, rows.record, record_of(done, drive, touch, share)[:])
+    record = record_of(read_record(workspace, lane, sizes), drive, touch, share)
+    write_record(workspace, lane, record, sizes)
     note_slips(workspace, lane, 1.0, state, robot, floor, sizes)
     workspace[rows.room * LANES + lane] = clearance(state.position, state.heading, hull, obstacles, near, end)
 
@@ -142,7 +141,7 @@ def _careful_step(
 @register_jitable(**INLINE)
 def state_of(workspace: Any, lane: Any, floor: Any, sizes: Sizes) -> Any:
     """State of one robot; one whose wheels may slip has rates of its own for each caster."""
-    return either(floor, read_state, _slip_state, (workspace, lane, 0, sizes.casters))
+    return either(floor, read_state, _slip_state, (workspace, lane, rows_of(sizes).state, sizes.casters))
 
 
 @register_jitable(**INLINE)
@@ -222,9 +221,9 @@ def feel_floor(workspace: Any, lanes: Any, floor: Any, sizes: Sizes) -> None:
         robot = read_robot(workspace, lane, rows_of(sizes).parameters, sizes.casters)
         write(workspace, lane, row, each(own_friction, (robot.platform.floor_friction,), robot.casters))
     for k in range(len(floor.patches)):
-        patch = floor.patches[k, 0], floor.patches[k, 1], floor.patches[k, 2], floor.patches[k, 3]
+        patch = patch_at(floor.patches, k)
         for lane in range(lanes):
-            state = read_state(workspace, lane, 0, sizes.casters)
+            state = read_state(workspace, lane, rows_of(sizes).state, sizes.casters)
             robot = read_robot(workspace, lane, rows_of(sizes).parameters, sizes.casters)
             before, shared = read(workspace, lane, row, sizes.casters), (state.position, state.heading, patch)
             write(workspace, lane, row, each(patch_friction, shared, before, state.directions, robot.casters))

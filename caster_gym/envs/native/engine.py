@@ -9,16 +9,17 @@ from caster_gym.engines.native.compilation import compilations, included
 from caster_gym.engines.native.held import Held
 from caster_gym.engines.native.lanes import LANES
 from caster_gym.engines.native.threads import over_blocks
+from caster_gym.envs import rows
 from caster_gym.envs.native import layout
 from caster_gym.envs.native import step as kernel
 from caster_gym.envs.native.robots import Robots
+from caster_gym.envs.plan import Beside, Span
 from caster_gym.envs.report import RESULT, named
-from caster_gym.envs.rows import span
 from caster_gym.envs.scene import Scene, draw_scene
 from caster_gym.mechanics.separation import Obstacles
 
 DRAW_A_PATH = -1
-_ENDED = span((RESULT.failed, RESULT.late))
+_ENDED = rows.span((RESULT.failed, RESULT.late))
 
 
 class Outcome(NamedTuple):
@@ -128,7 +129,7 @@ class TaskEngine(Robots):
         world = self._world
         blocks, parameters, clocks, _ = self.changing
         source: Any = world.source.still() if progress_stays else world.source
-        clocks[0] -= 1
+        clocks[layout.CLOCKS.done] -= 1
         still = world._replace(blocks=blocks, parameters=parameters, clocks=clocks, source=source, substeps=0)
         outcome = self._empty()
         still_actions = np.zeros((self.count, len(self.robot.driven)), dtype=np.float32)
@@ -146,8 +147,9 @@ class TaskEngine(Robots):
 
     def _over(self, late: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whose time is over; an episode that began late may take as long as any, but not past the trajectory's end."""
-        first, last, longest = self.plan.source.spans[self._world.clocks[1]].T
-        over: NDArray[np.bool_] = self._world.clocks[0] >= np.minimum(last - first, late + longest)
+        span = Span(*self.plan.source.spans[self.paths].T)
+        done = self._world.clocks[layout.CLOCKS.done]
+        over: NDArray[np.bool_] = done >= np.minimum(span.last - span.first, late + span.periods)
         return over
 
     def _empty(self) -> Outcome:
@@ -169,10 +171,10 @@ class TaskEngine(Robots):
         """What there is to see of one robot."""
         if self.count > 1 and self._kept_reports is None:
             self.keep_reports()
-        path = int(self._world.clocks[1, robot])
+        path = int(self._world.clocks[layout.CLOCKS.path, robot])
         return draw_scene(
             self.robot,
-            float(self._world.clocks[0, robot]) * self._pace.substeps * self._pace.time_step,
+            float(self._world.clocks[layout.CLOCKS.done, robot]) * self._pace.substeps * self._pace.time_step,
             self.states[robot],
             self._report_of(robot),
             len(self.plan.terms),
@@ -202,5 +204,6 @@ class TaskEngine(Robots):
         return self._workspace.reshape(-1, LANES)[row : row + self.report_rows, 0]
 
     def _obstacles_beside(self, path: int) -> Obstacles:
-        around, (near, end) = self.plan.around.obstacles, self.plan.arenas[path]
-        return around._replace(radii=around.radii[near:end], spans=around.spans[near:end])
+        around, beside = self.plan.around.obstacles, Beside(*self.plan.arenas[path])
+        here = slice(beside.first, beside.end)
+        return around._replace(radii=around.radii[here], spans=around.spans[here])

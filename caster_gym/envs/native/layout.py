@@ -15,13 +15,49 @@ from numba.extending import overload, register_jitable
 
 from caster_gym.engines.native.compiler import INLINE, borrowed
 from caster_gym.engines.native.guarding import borrowed_floor, borrowed_hull, borrowed_obstacles
-from caster_gym.engines.native.lanes import BODY_ROWS, LANES
+from caster_gym.engines.native.lanes import LANES, counting, read, write
 from caster_gym.envs.native.reference import borrowed_source
-from caster_gym.envs.observation import CHANNELS, Channel, Neighbour, observation_size, observe, observed
-from caster_gym.envs.report import RECORD, REPORT_ROWS, Situation
-from caster_gym.envs.tracking import POINT_ROWS, Reference
+from caster_gym.envs.observation import (
+    CHANNELS,
+    GAP_LIMIT,
+    Channel,
+    Neighbour,
+    observation_size,
+    observe,
+    observed,
+)
+from caster_gym.envs.report import RECORD, REPORT_ROWS, Record, Situation
+from caster_gym.envs.rows import numbered
+from caster_gym.envs.tracking import POINT_ROWS, REFERENCE_ROWS, Point, Reference
+from caster_gym.mechanics.integration import state_rows
 from caster_gym.mechanics.parameters import CASTER_FIELDS, PLATFORM_FIELDS
 from caster_gym.mechanics.scalars import each
+
+NO_WRENCH = (0.0, 0.0, 0.0)
+NO_NEIGHBOUR = Neighbour(GAP_LIMIT, 0.0, 0.0)
+_NEIGHBOUR_ROWS = len(Neighbour._fields)
+
+_REFERENCE = (0.0,) * REFERENCE_ROWS
+_POINT = (0.0,) * POINT_ROWS
+_RECORD = (0.0,) * len(RECORD)
+_SITUATION = (0.0,) * len(Situation._fields)
+
+
+class Clocks(NamedTuple):
+    """Where each robot is in its episode."""
+
+    done: Any  # control periods
+    path: Any  # index
+
+
+class Seeds(NamedTuple):
+    """What a robot's random numbers count from."""
+
+    key: Any
+    episode: Any  # the one that starts next
+
+
+CLOCKS, SEEDS = numbered(Clocks), numbered(Seeds)
 
 
 class World(NamedTuple):
@@ -29,13 +65,13 @@ class World(NamedTuple):
 
     blocks: Any  # float64 (blocks, rows · LANES)
     parameters: Any  # float64 (blocks, fields · LANES), or (1, fields · LANES) which all blocks share
-    clocks: Any  # int64 (2, robots): control periods done, path
-    seeds: Any  # uint64 (2, robots): key, episode
+    clocks: Any  # int64 (2, robots) as in `Clocks`
+    seeds: Any  # uint64 (2, robots) as in `Seeds`
     slots: Any  # int64 (2 N,): which action drives each motor, −1 for none
     source: Any  # ReferenceSource of the task
     hull: Any  # Hull; this and the next two are None where there is no obstacle
     obstacles: Any  # Obstacles
-    arenas: Any  # int64 (paths, 2): first and end of the obstacles beside each path
+    arenas: Any  # int64 (paths, 2) as in `caster_gym.envs.plan.Beside`
     floor: Any  # FloorTable; None where wheels roll without slip
     substeps: Any
     time_step: Any  # [s]
@@ -73,7 +109,7 @@ class Workspace(NamedTuple):
     slips: int  # greatest, of each wheel in the control period [m/s]
     friction: int  # of the floor under each wheel
     reference: int
-    preview: int
+    preview: int  # right behind the reference, where `write_point` puts it
     situation: int
     nearest: int  # obstacles
     observation: int
@@ -83,18 +119,13 @@ class Workspace(NamedTuple):
     end: int
 
 
-def state_rows(casters: int, slips: bool) -> int:
-    """Numbers of the state of a robot with so many casters, whose wheels may slip or not."""
-    return BODY_ROWS + 2 * casters + (2 * casters + 2 if slips else 0)
-
-
 def rows_of(sizes: Sizes) -> Workspace:
     """Where each part of a workspace begins."""
     casters, preview, nearest, slipping, terms = (len(items) for items in sizes)
     widths = Workspace(
         state=state_rows(casters, slipping > 0),
         room=1,
-        wrench=3,
+        wrench=len(NO_WRENCH),
         progress=1,
         parameters=PLATFORM_FIELDS + CASTER_FIELDS * casters,
         commands=2 * casters,
@@ -102,10 +133,10 @@ def rows_of(sizes: Sizes) -> Workspace:
         record=len(RECORD),
         slips=slipping,
         friction=slipping,
-        reference=len(Reference._fields),
+        reference=REFERENCE_ROWS,
         preview=POINT_ROWS * preview,
         situation=len(Situation._fields),
-        nearest=len(Neighbour._fields) * nearest,
+        nearest=_NEIGHBOUR_ROWS * nearest,
         observation=observation_size(casters, preview, nearest),
         report=REPORT_ROWS,
         terms=terms,
@@ -166,6 +197,77 @@ def copy_rows(source: Any, target: Any, lane: Any, lanes: Any, rows: Any, first:
     else:
         for row in range(rows):
             target[(first + row) * LANES + lane] = source[row * LANES + lane]
+
+
+@register_jitable(**INLINE)
+def read_record(workspace: Any, lane: Any, sizes: Sizes) -> Record:
+    """What has happened to a robot in the control period."""
+    return Record(*read(workspace, lane, rows_of(sizes).record, _RECORD))
+
+
+@register_jitable(**INLINE)
+def write_record(workspace: Any, lane: Any, record: Record, sizes: Sizes) -> None:
+    """Keep what has happened to a robot in the control period."""
+    write(workspace, lane, rows_of(sizes).record, record[:])
+
+
+@register_jitable(**INLINE)
+def read_reference(workspace: Any, lane: Any, sizes: Sizes) -> Reference:
+    """What a robot is to do now."""
+    return Reference(*read(workspace, lane, rows_of(sizes).reference, _REFERENCE))
+
+
+@register_jitable(**INLINE)
+def read_points(workspace: Any, lane: Any, sizes: Sizes) -> tuple[Point, ...]:
+    """What a robot is to do soon."""
+    return each(_read_point, (workspace, lane, rows_of(sizes).preview), counting(sizes.preview))
+
+
+@register_jitable(**INLINE)
+def _read_point(workspace: Any, lane: Any, row: Any, index: Any) -> Point:
+    return Point(*read(workspace, lane, row + POINT_ROWS * index, _POINT))
+
+
+@register_jitable(**INLINE)
+def write_reference(workspace: Any, lane: Any, row: Any, reference: Reference) -> None:
+    """Keep what a robot is to do now; row: first of its reference."""
+    write(workspace, lane, row, reference[:])
+
+
+@register_jitable(**INLINE)
+def write_point(workspace: Any, lane: Any, row: Any, index: Any, point: Point) -> None:
+    """Keep one of the points that a robot is to reach soon; row: first of its reference."""
+    write(workspace, lane, row + REFERENCE_ROWS + POINT_ROWS * index, point[:])
+
+
+@register_jitable(**INLINE)
+def read_situation(workspace: Any, lane: Any, sizes: Sizes) -> Situation:
+    """Where a robot is on its way."""
+    return Situation(*read(workspace, lane, rows_of(sizes).situation, _SITUATION))
+
+
+@register_jitable(**INLINE)
+def write_situation(workspace: Any, lane: Any, situation: Situation, sizes: Sizes) -> None:
+    """Keep where a robot is on its way."""
+    write(workspace, lane, rows_of(sizes).situation, situation[:])
+
+
+@register_jitable(**INLINE)
+def read_neighbours(workspace: Any, lane: Any, sizes: Sizes) -> tuple[Neighbour, ...]:
+    """The obstacles that are nearest to a robot."""
+    return each(read_neighbour, (workspace, lane, sizes), counting(sizes.nearest))
+
+
+@register_jitable(**INLINE)
+def read_neighbour(workspace: Any, lane: Any, sizes: Sizes, index: Any) -> Neighbour:
+    """One of the obstacles that are nearest to a robot."""
+    return Neighbour(*read(workspace, lane, rows_of(sizes).nearest + _NEIGHBOUR_ROWS * index, NO_NEIGHBOUR[:]))
+
+
+@register_jitable(**INLINE)
+def write_neighbour(workspace: Any, lane: Any, sizes: Sizes, index: Any, neighbour: Neighbour) -> None:
+    """Keep one of the obstacles that are nearest to a robot."""
+    write(workspace, lane, rows_of(sizes).nearest + _NEIGHBOUR_ROWS * index, neighbour[:])
 
 
 @register_jitable(**INLINE)

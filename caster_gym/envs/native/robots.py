@@ -18,7 +18,7 @@ from caster_gym.envs.observation import ObservationLayout
 from caster_gym.envs.plan import Pace, Plan
 from caster_gym.envs.report import RESULT
 from caster_gym.floor import Floor
-from caster_gym.mechanics.floor import FloorTable, floor_table
+from caster_gym.mechanics.floor import FloorTable, PatchRow, floor_table
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.robot import Robot
 
@@ -53,8 +53,8 @@ class Robots:
         self._build(
             np.zeros((1, self._rows.end * LANES) if count == 1 else (block_count(count), kept * LANES)),
             np.zeros((1, (end - kept) * LANES)),
-            np.zeros((2, count), dtype=np.int64),
-            np.zeros((2, count), dtype=np.uint64),
+            np.zeros((len(layout.CLOCKS), count), dtype=np.int64),
+            np.zeros((len(layout.SEEDS), count), dtype=np.uint64),
         )
         to_lanes(np.array([pack_parameters(robot_parameters(robot))]), self._world.parameters, 0)
 
@@ -114,7 +114,8 @@ class Robots:
     @property
     def changing(self) -> tuple[NDArray[Any], ...]:
         """Copies of all that changes from step to step: blocks, parameters, clocks, seeds."""
-        return tuple(np.array(part) for part in self._world[:4])
+        world = self._world
+        return tuple(np.array(part) for part in (world.blocks, world.parameters, world.clocks, world.seeds))
 
     @changing.setter
     def changing(self, parts: tuple[NDArray[Any], ...]) -> None:
@@ -122,11 +123,11 @@ class Robots:
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
-        self._world.seeds[:, robot] = key, 0
+        self._world.seeds[:, robot] = layout.Seeds(key=key, episode=0)
 
     def episodes(self, selected: NDArray[np.int64]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
         """Key, and number of the episode that is about to start, of some robots; random draws count from them."""
-        return self._world.seeds[0, selected], self._world.seeds[1, selected]
+        return self._world.seeds[layout.SEEDS.key, selected], self._world.seeds[layout.SEEDS.episode, selected]
 
     def put(
         self,
@@ -139,12 +140,12 @@ class Robots:
         rows = self._world.blocks.reshape(len(self._world.blocks), -1, LANES)
         block, lane = selected // LANES, selected % LANES
         if states is not None:
-            rows[block, : self._rows.room, lane] = states
+            rows[block, self._rows.state : self._rows.room, lane] = states
             rows[block, self._rows.room, lane] = 0.0
         if progress is not None:
             rows[block, self._rows.progress, lane] = progress
         if clocks is not None:
-            self._world.clocks[0, selected] = clocks
+            self._world.clocks[layout.CLOCKS.done, selected] = clocks
             self._late = np.zeros(self.count, dtype=np.int64) if self._late is None else self._late
             self._late[selected] = clocks
 
@@ -154,11 +155,11 @@ class Robots:
 
         Where wheels may slip, the rates of all casters and the tilt follow (robots, 9 + 4 N), as in `pack_state`.
         """
-        return from_lanes(self._world.blocks, 0, self._rows.room, self.count)
+        return from_lanes(self._world.blocks, self._rows.state, self._rows.room, self.count)
 
     @states.setter
     def states(self, value: NDArray[np.float64]) -> None:
-        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, 0)
+        to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, self._rows.state)
         if self._world.obstacles is not None:
             to_lanes(np.zeros((self.count, 1)), self._world.blocks, self._rows.room)
 
@@ -168,12 +169,13 @@ class Robots:
 
         They act until they are set again; an episode starts without any, whatever was set before its first step.
         """
-        return from_lanes(self._world.blocks, self._rows.wrench, 3, self.count)
+        return from_lanes(self._world.blocks, self._rows.wrench, len(layout.NO_WRENCH), self.count)
 
     @wrenches.setter
     def wrenches(self, value: NDArray[np.float64]) -> None:
-        if np.shape(value) != (self.count, 3):
-            raise ValueError(f"wrenches must have shape {(self.count, 3)}, got {np.shape(value)}")
+        shape = self.count, len(layout.NO_WRENCH)
+        if np.shape(value) != shape:
+            raise ValueError(f"wrenches must have shape {shape}, got {np.shape(value)}")
         to_lanes(np.ascontiguousarray(value, dtype=np.float64), self._world.blocks, self._rows.wrench)
 
     @property
@@ -208,10 +210,10 @@ class Robots:
     @property
     def paths(self) -> NDArray[np.int64]:
         """Which path each robot follows (robots,), as a copy."""
-        return np.array(self._world.clocks[1])
+        return np.array(self._world.clocks[layout.CLOCKS.path])
 
 
 def _table(floor: Floor) -> FloorTable:
     """The numbers of a floor, of one type whether there are patches or not: so that one compilation does for all."""
     table = floor_table(floor)
-    return table._replace(patches=np.zeros((0, 4)) if table.patches is None else table.patches)
+    return table._replace(patches=np.zeros((0, len(PatchRow._fields))) if table.patches is None else table.patches)

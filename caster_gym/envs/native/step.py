@@ -10,11 +10,14 @@ import numpy as np
 from numba.extending import register_jitable
 
 from caster_gym.engines.native.compiler import INLINE, borrowed, compiled, teach
-from caster_gym.engines.native.lanes import LANES, counting, read, read_pairs, read_robot, read_state, write
+from caster_gym.engines.native.lanes import LANES, counting, read_pairs, read_robot, read_state, write
 from caster_gym.envs import randomness
 from caster_gym.envs.native import compilation
 from caster_gym.envs.native.drive import begun, drive, neighbourhood, slips_of, state_of
 from caster_gym.envs.native.layout import (
+    CLOCKS,
+    NO_NEIGHBOUR,
+    SEEDS,
     Sizes,
     Views,
     World,
@@ -22,27 +25,26 @@ from caster_gym.envs.native.layout import (
     borrowed_views,
     borrowed_world,
     copy_rows,
+    read_neighbour,
+    read_neighbours,
+    read_points,
+    read_record,
+    read_reference,
+    read_situation,
     rows_of,
+    write_neighbour,
+    write_situation,
 )
 from caster_gym.envs.native.reference import evaluate, fetch_reference, weights_of
-from caster_gym.envs.observation import GAP_LIMIT, Neighbour, View, observe
+from caster_gym.envs.observation import Neighbour, View, observe
+from caster_gym.envs.plan import SPAN
 from caster_gym.envs.randomness import uniform
-from caster_gym.envs.report import RECORD, REPORT, RESULT, Record, Situation, flat_report
-from caster_gym.envs.rows import numbered
-from caster_gym.envs.tracking import POINT_ROWS, Point, Reference, report, start
+from caster_gym.envs.report import REPORT, RESULT, Situation, flat_report
+from caster_gym.envs.tracking import report, start
 from caster_gym.mechanics.grip_or_slip import all_joint_rates
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.scalars import clip, each
 from caster_gym.mechanics.separation import separation
-
-NEIGHBOUR = numbered(Neighbour)
-NEIGHBOUR_ROWS = len(NEIGHBOUR)
-
-_REFERENCE = (0.0,) * len(Reference._fields)
-_POINT = (0.0,) * POINT_ROWS
-_RECORD = (0.0,) * len(RECORD)
-_SITUATION = (0.0,) * len(Situation._fields)
-_NOBODY = Neighbour(GAP_LIMIT, 0.0, 0.0)
 
 teach(randomness)
 
@@ -50,7 +52,6 @@ teach(randomness)
 @register_jitable(**INLINE)
 def _look_around(workspace: Any, lane: Any, robot: Any, state: Any, obstacles: Any, world: World, sizes: Sizes) -> Any:
     """Write the nearest obstacles; returns the gap to the nearest one. [m]"""
-    rows = rows_of(sizes)
     gap = math.inf
     if obstacles is None:
         return gap
@@ -58,18 +59,8 @@ def _look_around(workspace: Any, lane: Any, robot: Any, state: Any, obstacles: A
     for k in range(near, end):
         apart = separation(state.position, state.heading, world.hull, obstacles, k)
         gap = min(apart.gap, gap)
-        _insert(workspace, lane, rows.nearest, apart.gap, apart.nx, apart.ny, sizes)
+        _insert(workspace, lane, Neighbour(apart.gap, apart.nx, apart.ny), sizes)
     return gap
-
-
-@register_jitable(**INLINE)
-def _read_point(workspace: Any, lane: Any, row: Any, index: Any) -> Any:
-    return Point(*read(workspace, lane, row + POINT_ROWS * index, _POINT))
-
-
-@register_jitable(**INLINE)
-def _read_neighbour(workspace: Any, lane: Any, row: Any, index: Any) -> Any:
-    return Neighbour(*read(workspace, lane, row + NEIGHBOUR_ROWS * index, _NOBODY[:]))
 
 
 @register_jitable(**INLINE)
@@ -81,11 +72,9 @@ def look(workspace: Any, first: Any, lanes: Any, source: Any, floor: Any, sizes:
         lane = first + i
         state = state_of(workspace, lane, floor, sizes)
         torques = read_pairs(workspace, lane, rows.torques, sizes.casters)
-        record = Record(*read(workspace, lane, rows.record, _RECORD))
-        reference = Reference(*read(workspace, lane, rows.reference, _REFERENCE))
-        points = each(_read_point, (workspace, lane, rows.preview), counting(sizes.preview))
-        situation = Situation(*read(workspace, lane, rows.situation, _SITUATION))
-        nearest = each(_read_neighbour, (workspace, lane, rows.nearest), counting(sizes.nearest))
+        record = read_record(workspace, lane, sizes)
+        reference, points = read_reference(workspace, lane, sizes), read_points(workspace, lane, sizes)
+        situation, nearest = read_situation(workspace, lane, sizes), read_neighbours(workspace, lane, sizes)
         robot = read_robot(workspace, lane, rows.parameters, sizes.casters)
         errors, endings, terms = evaluate(state, reference, torques, record, situation, robot, weights)
         view = View(state, reference, errors, points, nearest, all_joint_rates(state, robot, floor), robot)
@@ -99,26 +88,25 @@ def look(workspace: Any, first: Any, lanes: Any, source: Any, floor: Any, sizes:
 def fetch(workspace: Any, lane: Any, robot: Any, world: World, sizes: Sizes) -> None:
     """Fetch what the robot is to do, and what is near it."""
     rows = rows_of(sizes)
-    state = read_state(workspace, lane, 0, sizes.casters)
-    clock, path = world.clocks[0, robot], world.clocks[1, robot]
+    state = read_state(workspace, lane, rows.state, sizes.casters)
+    clock, path = world.clocks[CLOCKS.done, robot], world.clocks[CLOCKS.path, robot]
     before = workspace[rows.progress * LANES + lane]
     progress, share = fetch_reference(workspace, lane, rows.reference, state, clock, path, before, world.source)
     workspace[rows.progress * LANES + lane] = progress
     for k in range(len(sizes.nearest)):
-        write(workspace, lane, rows.nearest + NEIGHBOUR_ROWS * k, _NOBODY[:])
+        write_neighbour(workspace, lane, sizes, k, NO_NEIGHBOUR)
     gap = _look_around(workspace, lane, robot, state, world.obstacles, world, sizes)
-    write(workspace, lane, rows.situation, (progress, share, gap))
+    write_situation(workspace, lane, Situation(progress, share, gap), sizes)
 
 
 @register_jitable(**INLINE)
-def _insert(workspace: Any, lane: Any, row: Any, gap: Any, nx: Any, ny: Any, sizes: Sizes) -> None:
+def _insert(workspace: Any, lane: Any, obstacle: Neighbour, sizes: Sizes) -> None:
     """Put an obstacle among the nearest ones, which stay in order."""
     for k in range(len(sizes.nearest)):
-        at = row + NEIGHBOUR_ROWS * k
-        if gap < workspace[(at + NEIGHBOUR.gap) * LANES + lane]:
-            nearer = gap, nx, ny
-            gap, nx, ny = read(workspace, lane, at, nearer)
-            write(workspace, lane, at, nearer)
+        there = read_neighbour(workspace, lane, sizes, k)
+        if obstacle.gap < there.gap:
+            write_neighbour(workspace, lane, sizes, k, obstacle)
+            obstacle = there
 
 
 @register_jitable(**INLINE)
@@ -150,8 +138,8 @@ def give_results(workspace: Any, here: Any, robot: Any, world: World, views: Vie
         views.results[RESULT.reward, robot + i] = reward
         views.results[RESULT.failed, robot + i] = failed
     for i in range(robot, robot + here):
-        periods = world.source.spans[world.clocks[1, i], 2]
-        views.results[RESULT.late, i] = 1.0 if world.clocks[0, i] >= periods else 0.0
+        periods = world.source.spans[world.clocks[CLOCKS.path, i], SPAN.periods]
+        views.results[RESULT.late, i] = 1.0 if world.clocks[CLOCKS.done, i] >= periods else 0.0
 
 
 @register_jitable(**INLINE)
@@ -168,7 +156,7 @@ def _step_lanes(
             workspace[(row + j) * LANES + lane] = clip(float(actions[first + lane, slot]), -1.0, 1.0)
     drive(workspace, first, lanes, here, world, sizes)
     for lane in range(here):
-        world.clocks[0, first + lane] += 1
+        world.clocks[CLOCKS.done, first + lane] += 1
         fetch(workspace, lane, first + lane, world, sizes)
     look_at(workspace, world.source, world.floor, sizes)
     deliver(workspace, 0, here, first, views, sizes)
@@ -253,21 +241,21 @@ def _restart(selected: Any, wanted: Any, world: World, spread: Any, views: Views
         block, lane = world.blocks[robot // LANES], robot % LANES
         copy_rows(block, workspace, lane, 1, rows.parameters, 0)
         _take_parameters(robot // LANES, lane, 1, workspace, world, sizes)
-        key, episode = world.seeds[0, robot], world.seeds[1, robot]
-        world.seeds[1, robot] = episode + np.uint64(1)
-        world.clocks[0, robot] = 0
+        key, episode = world.seeds[SEEDS.key, robot], world.seeds[SEEDS.episode, robot]
+        world.seeds[SEEDS.episode, robot] = episode + np.uint64(1)
+        world.clocks[CLOCKS.done, robot] = 0
         drawn = int(uniform(key, episode, np.uint64(0)) * len(world.source.spans))
-        world.clocks[1, robot] = drawn if wanted[i] < 0 else wanted[i]
+        path = drawn if wanted[i] < 0 else wanted[i]
+        world.clocks[CLOCKS.path, robot] = path
         x = (2.0 * uniform(key, episode, np.uint64(1)) - 1.0) * spread[0]
         y = (2.0 * uniform(key, episode, np.uint64(2)) - 1.0) * spread[0]
         turn = (2.0 * uniform(key, episode, np.uint64(3)) - 1.0) * spread[1]
         directions = each(_random_direction, (key, episode), counting(sizes.casters))
         nowhere = State((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0), directions, (), ())
-        path = world.clocks[1, robot]
         fetch_reference(workspace, lane, rows.reference, nowhere, 0, path, -1.0, world.source)
-        reference = Reference(*read(workspace, lane, rows.reference, _REFERENCE))
+        reference = read_reference(workspace, lane, sizes)
         state = start(reference, (x, y), (math.cos(turn), math.sin(turn)), directions)
-        write(workspace, lane, 0, begun(workspace, lane, state, world.floor, sizes))
+        write(workspace, lane, rows.state, begun(workspace, lane, state, world.floor, sizes))
         for row in range(rows.room, rows.progress):
             workspace[row * LANES + lane] = 0.0
         workspace[rows.progress * LANES + lane] = -1.0

@@ -13,7 +13,7 @@ from torch import Tensor
 from caster_gym.engines.tensor.motion import state_of
 from caster_gym.envs.native.layout import as_many
 from caster_gym.envs.observation import GAP_LIMIT, Neighbour, ObservationLayout, View, observe
-from caster_gym.envs.plan import Plan
+from caster_gym.envs.plan import SPAN, Plan
 from caster_gym.envs.report import REPORT, Deviation, Endings, Pose, Record, Report, Situation, flat_report, sum_of
 from caster_gym.envs.tensor.obstacles import TorchSurroundings
 from caster_gym.envs.tensor.reference import Guidance, TorchSource, torch_weights
@@ -81,7 +81,7 @@ class TorchLook:
             observations=torch.stack(seen).T,
             rewards=sum_of(terms),
             terminated=sum_of(endings) > 0.0,
-            truncated=clocks >= source.spans[paths, 2],
+            truncated=clocks >= source.spans[paths, SPAN.periods],
             report=torch.stack([row.to(self._dtype) for row in rows]),
         )
         return outcome, guidance.progress, situation.clearance

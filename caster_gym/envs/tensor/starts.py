@@ -7,16 +7,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from caster_gym.engines.tensor.fleet import BODY_ROWS
+from caster_gym.engines.tensor.motion import state_of
 from caster_gym.envs.native.engine import TaskEngine
-from caster_gym.envs.native.layout import state_rows
 from caster_gym.envs.starts import Start, check_longest, check_motion, check_place, nearest_row
 from caster_gym.envs.tensor.randomness import episode_seed, uniform
 from caster_gym.envs.tensor.reference import TorchSource, torch_source
 from caster_gym.envs.tensor.state import TaskState
 from caster_gym.envs.tracking import start
 from caster_gym.mechanics.floor import FloorTable
-from caster_gym.mechanics.integration import State, pack_state, unpack_state
+from caster_gym.mechanics.integration import State, pack_state, state_rows
 from caster_gym.mechanics.parameters import RobotParameters
 from caster_gym.mechanics.scalars import Direction
 from caster_gym.mechanics.slip_state import rolling_state
@@ -57,12 +56,6 @@ class TorchStarts:
         still = state_rows(self._casters, self._floor is not None) - len(bodies)  # rates of a robot at rest
         return torch.cat((bodies, torch.zeros_like(bodies[:still]))), paths
 
-    def _rolling(self, bodies: Tensor, robot: RobotParameters) -> Tensor:
-        """Bodies (7 + 2 N, robots) on the task's floor, in which no wheel slips yet."""
-        if self._floor is None:
-            return bodies
-        return torch.stack(pack_state(rolling_state(unpack_state(bodies.unbind(0)), robot)))
-
     def _displacement(self, seed: Tensor) -> tuple[tuple[Tensor, Tensor], Direction]:
         """How far a start lies beside its place, in the reference's frame [m], and its turn."""
         x, y = (((2.0 * uniform(seed, i) - 1.0) * self._offset).to(self._dtype) for i in (1, 2))
@@ -75,7 +68,7 @@ class TorchStarts:
 
         Does what `caster_gym.envs.starts` does with arrays. Raises ValueError for what can be no start.
         """
-        engine, rows = self._engine, list(bodies[: BODY_ROWS + 2 * self._casters].unbind(0))
+        engine, now = self._engine, state_of(bodies, self._floor)
         plain, chosen = paths.cpu().numpy(), checked.cpu().numpy()
         clocks, progress = torch.zeros_like(state.clocks), torch.zeros_like(state.progress)
         source = engine.plan.source
@@ -89,26 +82,31 @@ class TorchStarts:
             else:
                 check_longest(engine)
                 clocks = torch.as_tensor(np.rint(place / engine.control_period).astype(np.int64), device=self._device)
-            none = torch.zeros_like(rows[0])
+            none = torch.zeros_like(state.progress)
             nowhere = State((none, none), (none, none), (none, none, none), ())
             reference = still.reference_at(paths, progress if by_progress else clocks, nowhere)
             offset, turn = self._displacement(episode_seed(state.keys, state.episodes))
-            rows[:4] = pack_state(start(reference, offset, turn, ()))[:4]
+            drawn = start(reference, offset, turn, ())
+            now = now._replace(position=drawn.position, heading=drawn.heading)
         if given.pose is not None:
             x, y, heading = self._tensor(given.pose).unbind(1)
-            rows[:4] = x, y, torch.cos(heading), torch.sin(heading)
+            now = now._replace(position=(x, y), heading=(torch.cos(heading), torch.sin(heading)))
         if given.twist is not None:
-            rows[4:7] = self._tensor(given.twist).unbind(1)
+            vx, vy, omega = self._tensor(given.twist).unbind(1)
+            now = now._replace(twist=(vx, vy, omega))
         if given.steering is not None:
             angles = self._tensor(given.steering)
-            rows[BODY_ROWS:] = torch.stack((torch.cos(angles), torch.sin(angles)), 2).flatten(1).unbind(1)
+            pairs = zip(torch.cos(angles).unbind(1), torch.sin(angles).unbind(1), strict=True)
+            now = now._replace(directions=tuple(pairs))
         if given.twist is not None:
-            directions = torch.stack(rows[BODY_ROWS:]).detach().cpu().double().numpy()
-            check_motion(engine.robot, np.arctan2(directions[1::2], directions[::2]).T[chosen], given.twist[chosen])
+            heads = np.array([torch.stack(f).detach().cpu().double().numpy() for f in now.directions])  # (N, 2, robots)
+            check_motion(engine.robot, np.arctan2(heads[:, 1], heads[:, 0]).T[chosen], given.twist[chosen])
         if by_progress and given.pose is not None and given.place is None:
             before = self._tensor(nearest_row(engine, plain, given.pose[:, :2]))
-            progress = self._source.fetch(unpack_state(tuple(rows)), clocks, paths, before).progress
-        return self._rolling(torch.stack(rows), robot), clocks, progress, still
+            progress = self._source.fetch(now, clocks, paths, before).progress
+        if self._floor is not None:
+            now = rolling_state(now, robot)
+        return torch.stack(pack_state(now)), clocks, progress, still
 
     def _tensor(self, numbers: NDArray[np.float64]) -> Tensor:
         return torch.as_tensor(numbers, dtype=self._dtype, device=self._device)

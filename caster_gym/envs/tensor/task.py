@@ -4,7 +4,6 @@
 Nothing waits for the device where there are no obstacles, and nothing is written in place.
 """
 
-from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +13,8 @@ from torch import Tensor
 from caster_gym.engines.tensor.compiler import compiled
 from caster_gym.engines.tensor.motion import torch_floor
 from caster_gym.engines.tensor.scalars import check_memory, checked_device, checked_dtype
-from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike
+from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, check_counts
 from caster_gym.envs.native.engine import DRAW_A_PATH
-from caster_gym.envs.native.layout import state_rows
 from caster_gym.envs.starts import DRAWN, Start, check_free
 from caster_gym.envs.tensor.drive import TorchDrive
 from caster_gym.envs.tensor.look import TorchLook
@@ -24,6 +22,7 @@ from caster_gym.envs.tensor.obstacles import torch_surroundings
 from caster_gym.envs.tensor.reference import torch_source
 from caster_gym.envs.tensor.starts import BEFORE_START, TorchStarts
 from caster_gym.envs.tensor.state import Given, TaskOutcome, TaskState, empty_record
+from caster_gym.mechanics.integration import state_rows
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.paths.specification import PathLike
 
@@ -45,8 +44,7 @@ class TorchTask:
     wherever motor limits and kernels have a slope, and end where an episode starts anew. An action that is not a number
     ends its robot's episode as not finite, since to look for it would wait for the device.
 
-    task: its name, as "track" or "my_module:MY_TASK", or its object. robot, path, actuation, arena: as for
-    `CasterTrackEnv`; fields: of the task's parameters. longest: greatest number of control periods of an episode.
+    task: its name, as "track" or "my_module:MY_TASK", or its object. All other arguments are those of `TorchVectorEnv`.
     compile fuses each part of a step into few kernels; graphs replays them as CUDA graphs, without gradients, see
     `TorchVectorEnv`. Without diagnostics, infos leave out traction use and conditioning, which take longer than
     everything else that is observed.
@@ -70,21 +68,22 @@ class TorchTask:
         path: PathLike | None = None,
         actuation: Actuation = None,
         arena: ArenaLike = None,
-        fields: Mapping[str, Any] | None = None,
-        longest: int | None = None,
+        max_episode_steps: int | None = None,
         *,
         device: torch.device | str = "cpu",
         dtype: torch.dtype = torch.float32,
         compile: bool = False,
         graphs: bool = False,
         diagnostics: bool = True,
+        **fields: Any,
     ) -> None:
         from caster_gym.tasks.building import build_engine  # tasks stand above, and are looked up when one is asked for
         from caster_gym.tasks.registry import find_task
 
+        check_counts(1, max_episode_steps)
         self.definition = definition = find_task(task)
         self.dtype, self.device = checked_dtype(dtype), checked_device(device)
-        self.engine, self.task = build_engine(definition, robot, path, actuation, arena, fields or {}, 1, longest)
+        self.engine, self.task = build_engine(definition, robot, path, actuation, arena, fields, 1, max_episode_steps)
         self.robot, self.layout, self.diagnostics = self.engine.robot, self.engine.layout, diagnostics
         self.parameters: RobotParameters = robot_parameters(self.robot)
         plan, casters, where = self.engine.plan, self.robot.caster_count, (self.dtype, self.device)

@@ -78,13 +78,13 @@ class TorchVectorEnv:
             path,
             actuation,
             arena,
-            fields,
             max_episode_steps,
             device=device,
             dtype=dtype,
             compile=compile,
             graphs=graphs,
             diagnostics=diagnostics,
+            **fields,
         )
         self.num_envs, self.device, self.dtype, self.robot = num_envs, self.task.device, dtype, self.task.robot
         check_memory(num_envs, 4 * self.task.layout.size, dtype, self.device)

@@ -1,24 +1,40 @@
 """A path that is followed at the robot's own pace, on generic scalars: its points, its nearest point, its reference.
 
-A row of a course, see `caster_gym.paths.course`, is (x, y, t_x, t_y, κ, cos ψ, sin ψ, ψ′, ψ″, ṡ²) at an arc length;
-between two rows the point is Hermite's cubic, everything else is linear.
+Between two rows of a course, see `caster_gym.paths.course`, the point is Hermite's cubic, everything else is linear.
 """
 
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
+from caster_gym.envs.rows import numbered
 from caster_gym.envs.tracking import Reference, kernel
-from caster_gym.mechanics.scalars import Scalar, clip, each, maximum, minimum, sqrt, where
+from caster_gym.mechanics.scalars import Scalar, clip, maximum, minimum, sqrt, where
 
-Row: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+
+class Row(NamedTuple):
+    """A row of a course, at an arc length."""
+
+    x: Scalar  # [m]
+    y: Scalar
+    tx: Scalar  # unit tangent
+    ty: Scalar
+    curvature: Scalar  # [1/m] positive to the left
+    cos: Scalar  # heading
+    sin: Scalar
+    bend: Scalar  # [rad/m] dψ/ds of the heading
+    bend_slope: Scalar  # [rad/m²] d²ψ/ds²
+    square_speed: Scalar  # [m²/s²] ṡ² of the time law
+
+
+ROW = numbered(Row)
 
 Point: TypeAlias = tuple[Scalar, Scalar]
 
 NEWTON_STEPS = 3  # of the projection, from the nearest chord
 
 
-def blend(share: Scalar, a: Scalar, b: Scalar) -> tuple[Scalar]:
+def blend(share: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """a + share · (b − a)."""
-    return (a + share * (b - a),)
+    return a + share * (b - a)
 
 
 def point_between(a: Row, b: Row, share: Scalar, spacing: Scalar) -> tuple[Scalar, Scalar]:
@@ -27,8 +43,8 @@ def point_between(a: Row, b: Row, share: Scalar, spacing: Scalar) -> tuple[Scala
     first, last = w * w * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * w)
     along, back = spacing * u * w * w, -spacing * u * u * w
     return (
-        first * a[0] + last * b[0] + along * a[2] + back * b[2],
-        first * a[1] + last * b[1] + along * a[3] + back * b[3],
+        first * a.x + last * b.x + along * a.tx + back * b.tx,
+        first * a.y + last * b.y + along * a.ty + back * b.ty,
     )
 
 
@@ -37,8 +53,8 @@ def slope_between(a: Row, b: Row, share: Scalar, spacing: Scalar) -> tuple[Scala
     u, w = share, 1.0 - share
     along, back = spacing * w * (1.0 - 3.0 * u), spacing * u * (3.0 * u - 2.0)
     return (
-        6.0 * u * w * (b[0] - a[0]) + along * a[2] + back * b[2],
-        6.0 * u * w * (b[1] - a[1]) + along * a[3] + back * b[3],
+        6.0 * u * w * (b.x - a.x) + along * a.tx + back * b.tx,
+        6.0 * u * w * (b.y - a.y) + along * a.ty + back * b.ty,
     )
 
 
@@ -47,8 +63,8 @@ def bend_between(a: Row, b: Row, share: Scalar, spacing: Scalar) -> tuple[Scalar
     u = share
     along, back = spacing * (6.0 * u - 4.0), spacing * (6.0 * u - 2.0)
     return (
-        (6.0 - 12.0 * u) * (b[0] - a[0]) + along * a[2] + back * b[2],
-        (6.0 - 12.0 * u) * (b[1] - a[1]) + along * a[3] + back * b[3],
+        (6.0 - 12.0 * u) * (b.x - a.x) + along * a.tx + back * b.tx,
+        (6.0 - 12.0 * u) * (b.y - a.y) + along * a.ty + back * b.ty,
     )
 
 
@@ -83,12 +99,13 @@ def course_reference(a: Row, b: Row, share: Scalar, spacing: Scalar) -> Referenc
     """What a course asks between two rows, at its time law, whose acceleration along the path is constant there."""
     x, y = point_between(a, b, share, spacing)
     tx, ty = slope_between(a, b, share, spacing)
-    (curvature,), (c,), (s,), (bend,), (bend_slope,), (square,) = each(blend, (share,), a[4:], b[4:])
+    c, s = blend(share, a.cos, b.cos), blend(share, a.sin, b.sin)
+    bend, bend_slope = blend(share, a.bend, b.bend), blend(share, a.bend_slope, b.bend_slope)
     length, turned = sqrt(tx * tx + ty * ty), sqrt(c * c + s * s)
     tx, ty, c, s = tx / length, ty / length, c / turned, s / turned
-    v = law_speed(square)
-    along = 0.5 * (b[9] - a[9]) / spacing
-    across = curvature * v * v
+    v = law_speed(blend(share, a.square_speed, b.square_speed))
+    along = 0.5 * (b.square_speed - a.square_speed) / spacing
+    across = blend(share, a.curvature, b.curvature) * v * v
     return Reference(
         x,
         y,
@@ -111,7 +128,7 @@ def at_rest(reference: Reference) -> Reference:
 
 def arrived_share(x: Scalar, y: Scalar, last: Row, scale: Scalar) -> Scalar:
     """What counts as progress at the end of the path: 1 on its last point."""
-    ahead, left = last[0] - x, last[1] - y
+    ahead, left = last.x - x, last.y - y
     return kernel(ahead * ahead + left * left, scale)
 
 

@@ -5,15 +5,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.engines.native.lanes import write
-from caster_gym.envs.plan import PlaceName, Plan, joined
-from caster_gym.envs.tracking import POINT_ROWS, REFERENCE_ROWS, Reference
+from caster_gym.envs.native.layout import write_point, write_reference
+from caster_gym.envs.plan import SPAN, PlaceName, Plan, Span, joined
+from caster_gym.envs.rows import check_names
+from caster_gym.envs.tracking import Reference, point_of
 from caster_gym.mechanics.integration import State
-from caster_gym.mechanics.scalars import minimum
+from caster_gym.mechanics.scalars import entries, minimum
 from caster_gym.paths.specification import AnyPath
 from caster_gym.paths.time_law import row_times
 from caster_gym.robot import Robot
-from caster_gym.tasks.follow.course import Row, at_rest, chord_share, course_reference, nearest_share, progress_share
+from caster_gym.tasks.follow.course import (
+    ROW,
+    Row,
+    at_rest,
+    chord_share,
+    course_reference,
+    nearest_share,
+    progress_share,
+)
 from caster_gym.tasks.follow.parameters import FollowParameters
 from caster_gym.tasks.task import Way
 
@@ -23,11 +32,14 @@ if TYPE_CHECKING:
     from caster_gym.tasks.follow.tensor import TorchCourses
 
 
+_POINT = ROW.x, ROW.y
+
+
 class Courses(NamedTuple):
     """Paths in space, with a time law."""
 
-    samples: Any  # float64 (rows of all courses, 10), as in caster_gym.paths.course
-    spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
+    samples: Any  # float64 (rows of all courses, 10) as in `Row`
+    spans: Any  # int64 (paths, 3) as in `caster_gym.envs.plan.Span`
     spacings: Any  # float64 (paths,) [m] between rows
     horizons: Any  # float64 (previewed points,) [m] ahead
     window: Any  # [m] how far ahead the nearest point is sought
@@ -55,14 +67,16 @@ class Courses(NamedTuple):
 
 def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: FollowParameters) -> tuple[Courses, list[Way]]:
     """The courses of all paths, with their time laws."""
-    from caster_gym.paths.course import build_courses  # late: only those who follow need it
+    from caster_gym.paths.course import COURSE_COLUMNS, build_courses  # late: only those who follow need it
 
+    check_names(Row._fields, "the fields of Row", COURSE_COLUMNS, "the columns of a Course")
     courses = build_courses(paths, robot, parameters.speed_limit, parameters.free_heading, margin=parameters.margin)
     samples, rows = joined([course.samples for course in courses])
+    first, last = rows.T
     periods = np.ceil([parameters.allowance * course.duration / parameters.control_period for course in courses])
     source = Courses(
         samples,
-        np.column_stack([rows, periods.astype(np.int64)]),
+        np.stack(Span(first, last, periods.astype(np.int64)), axis=1),
         np.array([course.spacing for course in courses]),
         np.array(parameters.preview),
         parameters.window,
@@ -75,7 +89,7 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: FollowParamete
         Way(
             course.name,
             course.samples,
-            course.samples[:, [0, 1, 5, 6]],
+            course.samples[:, [ROW.x, ROW.y, ROW.cos, ROW.sin]],
             lambda k, spacing=course.spacing: f"after {k * spacing:.2f} m",  # type: ignore[misc]
             course.description,
         )
@@ -86,35 +100,26 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: FollowParamete
 def facts(plan: Plan) -> dict[str, NDArray[np.float64]]:
     """Of each path (paths,): goal, the progress with which it is done [m], and law, the time that its law takes [s]."""
     source = plan.source
-    lengths = (source.spans[:, 1] - source.spans[:, 0]) * source.spacings
-    laws = [row_times(table[:, -1], spacing)[-1] for table, spacing in zip(plan.tables, source.spacings, strict=True)]
+    lengths = (source.spans[:, SPAN.last] - source.spans[:, SPAN.first]) * source.spacings
+    squares = [table[:, ROW.square_speed] for table in plan.tables]
+    laws = [row_times(one, spacing)[-1] for one, spacing in zip(squares, source.spacings, strict=True)]
     return {"goal": lengths - source.arrival, "law": np.array(laws)}
 
 
 def _row(samples: Any, i: Any) -> Row:
-    return (
-        samples[i, 0],
-        samples[i, 1],
-        samples[i, 2],
-        samples[i, 3],
-        samples[i, 4],
-        samples[i, 5],
-        samples[i, 6],
-        samples[i, 7],
-        samples[i, 8],
-        samples[i, 9],
-    )
+    return Row(*entries(samples, i, ROW))
 
 
 def _nearest(position: Any, path: Any, before: Any, source: Courses) -> float:
     """Arc length of the point nearest to the robot, from `before` to a window ahead. [m]"""
     x, y = position
-    base, last, spacing = source.spans[path, 0], source.spans[path, 1], source.spacings[path]
+    span, spacing = Span(*entries(source.spans, path, SPAN)), source.spacings[path]
+    base, last = span.first, span.last
     first = min(base + int(before / spacing), last - 1)
     end = min(first + int(source.window / spacing) + 2, last)
     best, chosen, guess = 1e300, first, 0.0
     for i in range(first, end):
-        a, b = (source.samples[i, 0], source.samples[i, 1]), (source.samples[i + 1, 0], source.samples[i + 1, 1])
+        a, b = entries(source.samples, i, _POINT), entries(source.samples, i + 1, _POINT)
         share, distance = chord_share(a, b, x, y)
         if distance < best:
             best, chosen, guess = distance, i, share
@@ -131,7 +136,8 @@ def _reference_at(path: Any, arc: Any, state: State, source: Courses) -> Referen
 
     A robot without a heading (0, 0) is one that has not started.
     """
-    base, last, spacing = source.spans[path, 0], source.spans[path, 1], source.spacings[path]
+    span, spacing = Span(*entries(source.spans, path, SPAN)), source.spacings[path]
+    base, last = span.first, span.last
     i = min(base + int(arc / spacing), last - 1)
     share = min(arc / spacing - (i - base), 1.0)
     reference = course_reference(_row(source.samples, i), _row(source.samples, i + 1), share, spacing)
@@ -146,12 +152,13 @@ def _reference_at(path: Any, arc: Any, state: State, source: Courses) -> Referen
 
 def fetch(block: Any, lane: Any, row: Any, state: State, _clock: Any, path: Any, before: Any, source: Courses) -> Any:
     """Write reference and previewed points of a robot where it is on its path; see `fetch_reference`."""
-    length = (source.spans[path, 1] - source.spans[path, 0]) * source.spacings[path]
+    span = Span(*entries(source.spans, path, SPAN))
+    length = (span.last - span.first) * source.spacings[path]
     progress = 0.0 if before < 0.0 else _nearest(state.position, path, before, source)
     reference = _reference_at(path, progress, state, source)
-    write(block, lane, row, reference[:])
-    for p in range(len(source.horizons)):
-        coming = _reference_at(path, minimum(progress + source.horizons[p], length), state, source)
-        write(block, lane, row + REFERENCE_ROWS + p * POINT_ROWS, coming[:POINT_ROWS])
-    last = _row(source.samples, source.spans[path, 1])
+    write_reference(block, lane, row, reference)
+    for i in range(len(source.horizons)):
+        coming = _reference_at(path, minimum(progress + source.horizons[i], length), state, source)
+        write_point(block, lane, row, i, point_of(coming))
+    last = _row(source.samples, span.last)
     return progress, progress_share(progress, before, length, state.position, last, source)

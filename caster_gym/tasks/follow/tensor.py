@@ -1,15 +1,22 @@
 """Paths walked at the robots' own pace, for a batch of tensors."""
 
-from typing import cast
-
 import torch
 from torch import Tensor
 
+from caster_gym.envs.plan import SPAN
 from caster_gym.envs.tensor.reference import Guidance
-from caster_gym.envs.tracking import POINT_ROWS, Point, Reference
+from caster_gym.envs.tracking import Reference, point_of
 from caster_gym.mechanics.integration import State
 from caster_gym.mechanics.scalars import each, maximum, minimum, where
-from caster_gym.tasks.follow.course import Row, at_rest, chord_share, course_reference, nearest_share, progress_share
+from caster_gym.tasks.follow.course import (
+    ROW,
+    Row,
+    at_rest,
+    chord_share,
+    course_reference,
+    nearest_share,
+    progress_share,
+)
 from caster_gym.tasks.follow.reference import Courses
 
 
@@ -21,7 +28,7 @@ class TorchCourses:
         self.spans = torch.as_tensor(source.spans, device=device)
         self._source, self._horizons = source, tuple(source.horizons.tolist())
         self._spacings = torch.as_tensor(source.spacings, dtype=dtype, device=device)
-        self._lengths = self._spacings * (self.spans[:, 1] - self.spans[:, 0])
+        self._lengths = self._spacings * (self.spans[:, SPAN.last] - self.spans[:, SPAN.first])
         self._windows = torch.as_tensor((source.window / source.spacings).astype(int) + 2, device=device)
         self._widest = torch.arange(int((source.window / source.spacings).max()) + 2, device=device)
 
@@ -34,18 +41,19 @@ class TorchCourses:
         preview = []
         for ahead in self._horizons:
             coming = self.reference_at(path, torch.minimum(progress + ahead, length), state)
-            preview.append(Point(*coming[:POINT_ROWS]))
-        last = self._row(self.spans[path, 1])
+            preview.append(point_of(coming))
+        last = self._row(self.spans[path, SPAN.last])
         share = progress_share(progress, before, length, state.position, last, source)
         return Guidance(reference, tuple(preview), progress, share)
 
     def _row(self, i: Tensor) -> Row:
-        return cast(Row, self.samples[:, i].unbind(0))
+        return Row(*self.samples[:, i].unbind(0))
 
     def nearest(self, state: State, path: Tensor, before: Tensor) -> Tensor:
         """Arc length of the point nearest to each robot, from `before` to a window ahead. [m]"""
         x, y = state.position
-        base, last, spacing = self.spans[path, 0], self.spans[path, 1], self._spacings[path]
+        base, last = self.spans[path, SPAN.first], self.spans[path, SPAN.last]
+        spacing = self._spacings[path]
         first = torch.minimum(base + (before.detach() / spacing).long(), last - 1)
         end = torch.minimum(first + self._windows[path], last)
         with torch.no_grad():
@@ -53,7 +61,8 @@ class TorchCourses:
             within = rows < end[:, None]
             rows = torch.minimum(rows, last[:, None] - 1)
             ahead = rows + 1
-            a, b = (self.samples[0, rows], self.samples[1, rows]), (self.samples[0, ahead], self.samples[1, ahead])
+            xs, ys = self.samples[ROW.x], self.samples[ROW.y]
+            a, b = (xs[rows], ys[rows]), (xs[ahead], ys[ahead])
             shares, distance = chord_share(a, b, x[:, None], y[:, None])
             best = torch.where(within, distance, torch.inf).argmin(1)
             guess = shares.gather(1, best[:, None])[:, 0]
@@ -72,7 +81,8 @@ class TorchCourses:
 
         A robot without a heading (0, 0) is one that has not started.
         """
-        base, last, spacing = self.spans[path, 0], self.spans[path, 1], self._spacings[path]
+        base, last = self.spans[path, SPAN.first], self.spans[path, SPAN.last]
+        spacing = self._spacings[path]
         i = torch.minimum(base + (arc.detach() / spacing).long(), last - 1)
         share = minimum(arc / spacing - (i - base), 1.0)
         walked = course_reference(self._row(i), self._row(i + 1), share, spacing)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from caster_gym.arrays import Array
-from caster_gym.envs.plan import PlaceName
+from caster_gym.envs.plan import PlaceName, Span
+from caster_gym.envs.tracking import POSE, REFERENCE_ROWS
 from caster_gym.paths.specification import AnyPath, build_trajectories
 from caster_gym.robot import Robot
 from caster_gym.tasks.hold.parameters import HoldParameters
@@ -31,12 +32,13 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: HoldParameters
         ends = {f"pose {x:g}, {y:g}, {heading:g}": (x, y, np.cos(heading), np.sin(heading))}
     else:
         trajectories = build_trajectories(paths, robot, parameters.control_period)
-        ends = {trajectory.name: tuple(trajectory.samples[-1, :4]) for trajectory in trajectories}
+        ends = {trajectory.name: tuple(trajectory.samples[-1, POSE]) for trajectory in trajectories}
     poses = np.array(list(ends.values()))
-    samples, rows = np.zeros((len(poses), 10)), np.arange(len(poses))
-    samples[:, :4] = poses
+    samples, rows = np.zeros((len(poses), REFERENCE_ROWS)), np.arange(len(poses))
+    samples[:, POSE] = poses
     periods = np.full_like(rows, round(parameters.duration / parameters.control_period))
-    source = Poses(samples, np.stack([rows, rows, periods], 1), np.zeros(len(parameters.preview), dtype=np.int64))
+    spans = np.stack(Span(first=rows, last=rows, periods=periods), axis=1)
+    source = Poses(samples, spans, np.zeros(len(parameters.preview), dtype=np.int64))
     return source, [Way(name, _arrow(pose), pose[None], _place) for name, pose in zip(ends, poses, strict=True)]
 
 

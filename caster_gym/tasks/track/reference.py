@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from caster_gym.engines.native.lanes import LANES
-from caster_gym.envs.plan import PlaceName, joined
-from caster_gym.envs.tracking import POINT_ROWS, REFERENCE_ROWS
+from caster_gym.envs.native.layout import write_point, write_reference
+from caster_gym.envs.plan import SPAN, PlaceName, Span, joined
+from caster_gym.envs.tracking import POSE, REFERENCE, Reference, point_of
 from caster_gym.mechanics.integration import State
+from caster_gym.mechanics.scalars import entries
 from caster_gym.paths.specification import AnyPath, build_trajectories
 from caster_gym.robot import Robot
 from caster_gym.tasks.task import Way
@@ -23,7 +24,7 @@ class Timetable(NamedTuple):
     """Trajectories in time."""
 
     samples: Any  # float64 (rows of all trajectories, 10), as in caster_gym.paths.trajectory
-    spans: Any  # int64 (paths, 3): first and last row, control periods of an episode
+    spans: Any  # int64 (paths, 3) as in `caster_gym.envs.plan.Span`
     horizons: Any  # int64 (previewed points,): control periods ahead
     weights: Any = np.zeros(0)  # float64 (weights,), as in TrackWeights
 
@@ -47,26 +48,27 @@ def lay_out(robot: Robot, paths: tuple[AnyPath, ...], parameters: TrackParameter
     """The trajectories of all paths."""
     trajectories = build_trajectories(paths, robot, parameters.control_period)
     samples, rows = joined([trajectory.samples for trajectory in trajectories])
-    spans = np.column_stack([rows, rows[:, 1] - rows[:, 0]])
+    first, last = rows.T
+    spans = np.stack(Span(first, last, periods=last - first), axis=1)
     periods = np.array([round(s / parameters.control_period) for s in parameters.preview], dtype=np.int64)
 
     def moment(k: int) -> str:
         return f"at {k * parameters.control_period:.2f} s"
 
     return Timetable(samples, spans, periods), [
-        Way(one.name, one.samples, one.samples[:, :4], moment, one.description) for one in trajectories
+        Way(one.name, one.samples, one.samples[:, POSE], moment, one.description) for one in trajectories
     ]
 
 
 def fetch(block: Any, lane: Any, row: Any, _state: State, clock: Any, path: Any, _before: Any, source: Any) -> Any:
     """Write reference and previewed points at a robot's clock; see `fetch_reference`."""
-    base, end = source.spans[path, 0], source.spans[path, 1]
-    now = min(base + clock, end)
-    for j in range(REFERENCE_ROWS):
-        block[(row + j) * LANES + lane] = source.samples[now, j]
-    row += REFERENCE_ROWS
-    for p in range(len(source.horizons)):
-        then = min(base + clock + source.horizons[p], end)
-        for j in range(POINT_ROWS):
-            block[(row + p * POINT_ROWS + j) * LANES + lane] = source.samples[then, j]
+    now, end = source.spans[path, SPAN.first] + clock, source.spans[path, SPAN.last]
+    write_reference(block, lane, row, _sample(source.samples, min(now, end)))
+    for i in range(len(source.horizons)):
+        coming = _sample(source.samples, min(now + source.horizons[i], end))
+        write_point(block, lane, row, i, point_of(coming))
     return 0.0, 0.0
+
+
+def _sample(samples: Any, k: Any) -> Reference:
+    return Reference(*entries(samples, k, REFERENCE))

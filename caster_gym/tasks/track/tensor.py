@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from caster_gym.envs.plan import SPAN
 from caster_gym.envs.tensor.reference import Guidance
 from caster_gym.envs.tracking import POINT_ROWS, Point, Reference
 from caster_gym.mechanics.integration import State
@@ -19,12 +20,12 @@ class TorchTimetable:
 
     def reference_at(self, path: Tensor, clock: Tensor, _state: State) -> Reference:
         """Reference at clocks (robots,) [control periods]."""
-        first, last = self.spans[path, 0], self.spans[path, 1]
+        first, last = self.spans[path, SPAN.first], self.spans[path, SPAN.last]
         return Reference(*self.samples[:, torch.minimum(first + clock, last)].unbind(0))
 
     def fetch(self, state: State, clock: Tensor, path: Tensor, before: Tensor) -> Guidance:
         """Reference and preview at the robots' clocks."""
-        first, last = self.spans[path, 0], self.spans[path, 1]
+        first, last = self.spans[path, SPAN.first], self.spans[path, SPAN.last]
         reference = self.reference_at(path, clock, state)
         rows = [self.samples[:POINT_ROWS, torch.minimum(first + clock + ahead, last)] for ahead in self._horizons]
         none = torch.zeros_like(before)
