@@ -18,10 +18,8 @@ from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.tasks.track.parameters import TrackParameters
 
-QUICK: dict[str, Any] = {
-    "control_period": 0.01,
-    "substeps": 1,
-}  # one RK4 step a period: Torch alone, uncompiled, is slow
+# One RK4 step a period, since Torch alone, uncompiled, is slow
+QUICK: dict[str, Any] = {"control_period": 0.01, "substeps": 1}
 PATH = {"shape": "random_paths", "duration": 2.5, "max_speed": 0.3, "count": 2}
 TASK = parse(
     TaskSettings,

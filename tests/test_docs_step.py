@@ -9,12 +9,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 TEXT, TORCH = (ROOT / "docs/step.md").read_text(encoding="utf-8").split("## On tensors")
 TASK, LOOK = ((ROOT / f"caster_gym/envs/tensor/{name}.py").read_text(encoding="utf-8") for name in ("task", "look"))
-ROWS = re.findall(r"^\| `([\w.]+)`( of the task)? \| (?:`([\w.]+)`|you) \|.*\| (\S+\.py) \|$", TEXT, re.M)
-FILES = {name: file for name, of_task, _, file in ROWS if not of_task}
 
-# How a function is called where not by its own name: compiled, chosen for all lanes, or by the task
+
+def rows(text):
+    """Name of each function in a table, whether it is the task's, what calls it, and its file."""
+    return re.findall(r"^\| `([\w.]+)`( of the task)? \| (?:`([\w.]+)`|you) \|.*\| (\S+\.py) \|$", text, re.M)
+
+
+TABLES = {"compiled": rows(TEXT), "on tensors": rows(TORCH)}
+FILES = {kind: {name: file for name, of_task, _, file in table if not of_task} for kind, table in TABLES.items()}
+
+# How a function is called where not by its own name: compiled, chosen for all lanes, by the task, or maybe compiled
 CALLED = {"_step_single": "step_single", "look": "look_at"}
-CHOSEN = {("fetch", "fetch"): "fetch_reference", ("look", "evaluate_by"): "evaluate"}
+CHOSEN = {
+    ("fetch", "fetch"): "fetch_reference",
+    ("look", "evaluate_by"): "evaluate",
+    ("TorchTask.step", "TorchLook.look"): "_look",
+}
 
 
 def calls(name, file):
@@ -28,22 +39,27 @@ def calls(name, file):
     return [node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "") for node in found]
 
 
-def test_the_table_is_read_whole_and_names_nine_files():
-    table = TEXT.partition("|---|---|---|---|\n")[2].partition("\n\n")[0]
-    assert len(ROWS) == len(table.splitlines()) > 10
-    assert len({file for *_, file in ROWS}) == 9
+@pytest.mark.parametrize(("kind", "text"), [("compiled", TEXT), ("on tensors", TORCH)])
+def test_the_table_is_read_whole_and_names_nine_files(kind, text):
+    table = text.partition("|---|---|---|---|\n")[2].partition("\n\n")[0]
+    assert len(TABLES[kind]) == len(table.splitlines()) > 10
+    assert len({file for *_, file in TABLES[kind]}) == 9
 
 
-@pytest.mark.parametrize(("name", "file"), [(name, file) for name, _, _, file in ROWS])
+@pytest.mark.parametrize(
+    ("name", "file"), dict.fromkeys((name, file) for table in TABLES.values() for name, _, _, file in table)
+)
 def test_each_function_is_where_the_page_says(name, file):
     calls(name, file)
 
 
-@pytest.mark.parametrize("caller", dict.fromkeys(caller for _, _, caller, _ in ROWS if caller))
-def test_what_is_called_by_one_function_is_called_there_in_this_order(caller):
-    told = [name for name, _, by, _ in ROWS if by == caller]
+@pytest.mark.parametrize(
+    ("kind", "caller"), dict.fromkeys((kind, by) for kind, table in TABLES.items() for _, _, by, _ in table if by)
+)
+def test_what_is_called_by_one_function_is_called_there_in_this_order(kind, caller):
+    told = [name for name, _, by, _ in TABLES[kind] if by == caller]
     wanted = [CHOSEN.get((caller, name), CALLED.get(name, name.rpartition(".")[2])) for name in told]
-    assert [name for name in calls(caller, FILES[caller]) if name in wanted] == wanted
+    assert [name for name in calls(caller, FILES[kind][caller]) if name in wanted] == wanted
 
 
 def test_what_is_chosen_while_compiling_is_what_the_page_goes_on_with():
@@ -51,6 +67,7 @@ def test_what_is_chosen_while_compiling_is_what_the_page_goes_on_with():
     assert "fetch = code_of(source).fetch\n" in chosen
     assert "endings, reward = code.endings, code.reward\n" in chosen
     assert chosen.count("evaluate_by(\n") == 1
+    assert "self._look, self._place = self._drive.move, self._looking.look," in TASK
 
 
 def imported(page):
@@ -59,35 +76,13 @@ def imported(page):
 
 
 def test_everything_that_a_step_imports_is_on_the_page_or_plumbing():
-    """What a step imports from environments: rows and borrowed arrays are plumbing, which one need not follow."""
+    """What a step imports from environments: names of rows and borrowed arrays are plumbing, which one need not follow."""
     page = (ROOT / "caster_gym/envs/native/step.py").read_text(encoding="utf-8")
-    plumbing = {"native", "layout", "reference", "rows", "report", "randomness"}
-    assert imported(page) - plumbing <= {Path(file).stem for *_, file in ROWS}
-
-
-ON_TENSORS = re.findall(r"^\| `([\w.]+)` \|.*\| (\S+\.py) \|$", TORCH, re.M)
-
-
-def test_on_tensors_each_call_stands_in_one_of_nine_files():
-    assert len({file for _, file in ON_TENSORS}) <= 9 <= len(ON_TENSORS)
-    for name, file in ON_TENSORS:
-        text = (ROOT / file).read_text(encoding="utf-8")
-        assert re.search(rf"^ *(def|class) {name.rpartition('.')[2]}\b", text, re.M), name
-
-
-def stands_in_order(text, *calls):
-    places = [text.index(call) for call in calls]
-    return places == sorted(places)
-
-
-def test_on_tensors_it_calls_them_in_the_same_order():
-    step = TASK[TASK.index("    def step(") : TASK.index("    def restart(")]
-    assert stands_in_order(step, ".drive(", "._look(")
-    look = LOOK[LOOK.index("    def look(") : LOOK.index("    def _fetch(")]
-    assert stands_in_order(look, "._fetch(", " evaluate_by(", " observe(", "._report(")
+    plumbing = {"native", "layout", "plan", "reference", "report", "randomness"}
+    assert imported(page) - plumbing <= {Path(file).stem for file in FILES["compiled"].values()}
 
 
 def test_everything_on_tensors_is_on_the_page_or_plumbing_too():
     """Plumbing there: what a task is made from, what goes in and out of calls, and starts, which no step needs."""
     plumbing = {"inputs", "engine", "layout", "plan", "reference", "report", "starts", "state"}
-    assert (imported(TASK) | imported(LOOK)) - plumbing <= {Path(file).stem for _, file in ON_TENSORS}
+    assert (imported(TASK) | imported(LOOK)) - plumbing <= {Path(file).stem for file in FILES["on tensors"].values()}

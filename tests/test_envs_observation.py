@@ -70,7 +70,7 @@ PAIR = (1.0, 1.0)
         ),
         (
             [Channel("mine", directions, PAIR, "", "casters")],  # type: ignore[arg-type]
-            r"'mine' of the observation is per='casters', which must be one of \"robot\", \"caster\", \"point\", \"obst",
+            r"'mine' of the observation is per='casters', which must be one of .robot., .caster., .point., .obstacle.$",
         ),
         ([*CHANNELS, CHANNELS[0]], r"the observation has 2 channels 'position_error': each needs a name of its own"),
     ],

@@ -9,6 +9,7 @@ import pytest
 from caster_gym.engines.native.compilation import compilations
 from caster_gym.envs.report import Endings
 from caster_gym.envs.tensor.task import TorchTask
+from caster_gym.mechanics.scalars import absolute, clip, sqrt, where
 from caster_gym.own_errors import OwnCodeError
 from caster_gym.tasks.building import build_engine
 from caster_gym.tasks.checks import check_reward
@@ -49,6 +50,14 @@ def complete(moment, weights):
     return Terms(power=-weights.effort_weight * moment.record.power, near=1.0)
 
 
+def lowest(moment, weights):
+    return Terms(min(moment.errors.ahead, weights.effort_weight), 0.0)
+
+
+def branching(moment, _weights):
+    return Terms(1.0 if moment.errors.ahead > 0.0 and moment.effort < 1.0 else 0.0, 0.0)
+
+
 def task_with(reward=complete, source=Timetable, **other):
     """The tracking task with other parts; nothing is taught to the compiler."""
     task = object.__new__(type(TASK))
@@ -84,6 +93,10 @@ WRONG: dict[str, dict[str, Any]] = {
     r"touching_ends, effort_weight\) names the parameters of TrackParameters that it may use": {
         "reward": lambda moment, weights: Terms(weights.power_weight, 0.0)
     },
+    r"the reward of task 'mine': TypeError: conditions differ from robot to robot, and `if`, `and`, `or`, `not`, `min` "
+    r"and `max` take one for all: write where, minimum, .* \(.*test_tasks_checks\.py, line \d+\)": {"reward": lowest},
+    r"conditions differ from robot to robot, .*\.py, line \d+\)$": {"reward": branching},
+    r"the endings of task 'mine': TypeError: conditions differ": {"endings": branching},
     r"task 'mine': each field of Unknown must be a number of TrackParameters, and 'power_weight' is none there": {
         "weights": Unknown
     },
@@ -104,6 +117,19 @@ def test_what_does_not_fit_is_told_before_anything_is_compiled(sentence):
     with pytest.raises(OwnCodeError, match=sentence):
         TorchTask(task, path="circle")
     assert compilations() == before
+
+
+def test_a_reward_may_do_all_that_scalars_can():
+    """Calculate with numbers, conditions and weights, choose by conditions, and branch by what all robots share."""
+
+    def rich(moment, weights):
+        x = moment.errors.ahead
+        chosen = clip(where(x > 0.2, x, -x) + absolute(1 - x) * sqrt(x * x), 0.0, 1.0)
+        counted = (x != 2.0) * (x >= 0.1) + 2.0 ** (-x) / (1.0 + abs(x) ** 2)
+        return Terms(power=chosen if weights.effort_weight > 0.0 else 0.0, near=counted)
+
+    task = task_with(reward=rich)
+    check_reward(task, weights_of(task))
 
 
 @pytest.mark.parametrize("number", [lambda weights: 1.0 / (weights.effort_weight - 0.02), lambda _: math.sqrt(-1.0)])

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym.envs.tracking import Reference
+from caster_gym.paths.course import COURSE_COLUMNS
 from caster_gym.tasks.follow import course
 from caster_gym.tasks.follow.parameters import FollowParameters
 
@@ -19,7 +20,7 @@ def row(s, square):
     bend = TURN / RADIUS + bend_slope * s
     psi = TURN * angle + 0.5 * bend_slope * s**2
     place = (RADIUS * np.cos(angle), RADIUS * np.sin(angle), -np.sin(angle), np.cos(angle))
-    return (*place, 1.0 / RADIUS, np.cos(psi), np.sin(psi), bend, bend_slope, square)
+    return course.Row(*place, 1.0 / RADIUS, np.cos(psi), np.sin(psi), bend, bend_slope, square)
 
 
 def random_rows(rng):
@@ -27,10 +28,14 @@ def random_rows(rng):
     a, b = rng.normal(size=10), rng.normal(size=10)
     a[2:4] /= np.hypot(*a[2:4])
     b[2:4] /= np.hypot(*b[2:4])
-    return tuple(a), tuple(b)
+    return course.Row(*a), course.Row(*b)
 
 
 ROWS = row(0.0, FIRST), row(SPACING, LAST)
+
+
+def test_rows_are_those_of_a_course():
+    assert course.Row._fields == COURSE_COLUMNS
 
 
 def test_points_between_rows_start_and_end_at_them_along_their_tangents():
