@@ -76,7 +76,7 @@ def imported(page):
 
 
 def test_everything_that_a_step_imports_is_on_the_page_or_plumbing():
-    """What a step imports from environments: names of rows and borrowed arrays are plumbing, which one need not follow."""
+    """What a step imports from environments: rows and borrowed arrays are plumbing, which one need not follow."""
     page = (ROOT / "caster_gym/envs/native/step.py").read_text(encoding="utf-8")
     plumbing = {"native", "layout", "plan", "reference", "report", "randomness"}
     assert imported(page) - plumbing <= {Path(file).stem for file in FILES["compiled"].values()}

@@ -229,8 +229,8 @@ class Fleet:
         if state.shape != (self.count, self._torque_row):
             raise ValueError(wrong_state(state.shape, self.count, len(self._casters), self._floor is not None))
         state = self._checked("state", state, self._torque_row)
-        units = unpack_state(tuple(state[:, :rolling].T))
-        length = np.hypot(*np.array((units.heading, *units.directions)).T)  # (robots, 1 + N)
+        now = unpack_state(tuple(state[:, :rolling].T))
+        length = np.stack([np.hypot(c, s) for c, s in (now.heading, *now.directions)], axis=1)
         if np.abs(length - 1.0).max() > 1e-6:
             raise ValueError(
                 f"directions must be unit vectors, got a length of {length.flat[np.abs(length - 1).argmax()]:g}"
