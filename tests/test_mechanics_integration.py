@@ -5,8 +5,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym import Model, load_robot
-from caster_gym.mechanics.integration import State, pack_state, rk4_step, runge_kutta, unit, unpack_state
+from caster_gym.mechanics.integration import (
+    State,
+    pack_state,
+    rk4_step,
+    runge_kutta,
+    state_at_rest,
+    state_rows,
+    unit,
+    unpack_state,
+)
 from caster_gym.mechanics.parameters import robot_parameters
+from caster_gym.mechanics.slip_state import rolling_state, unpack_slip_state
 from tests.kane import Kane
 from tests.random_robots import frictionless, random_motion, random_robot
 
@@ -15,6 +25,16 @@ def start(robot, seed, speed=0.5):
     """A state somewhere in the world and torques that move it on."""
     steering, twist, torque, _ = random_motion(seed, robot)
     return np.concatenate(([0.3, -0.2, 2.0], speed * twist, steering)), 0.2 * torque
+
+
+@pytest.mark.parametrize("caster_count", [2, 3])
+def test_a_state_has_as_many_numbers_as_are_counted_whether_wheels_slip_or_not(caster_count):
+    rolling = state_at_rest(caster_count)
+    slipping = rolling_state(rolling, robot_parameters(random_robot(70, caster_count)))
+    for state, slips, unpack in ((rolling, False, unpack_state), (slipping, True, unpack_slip_state)):
+        numbers = pack_state(state)
+        assert len(numbers) == state_rows(caster_count, slips)
+        assert unpack(numbers) == state
 
 
 def energies(model, states):
