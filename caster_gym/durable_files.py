@@ -110,21 +110,19 @@ def temporary_name() -> str:
 def remove_leftovers(folder: Path, locked: bool = False) -> None:
     """Remove what processes that are gone have left unfinished in a folder, and complete what they had begun to rename.
 
-    locked: the caller has the lock of the folder and nobody else writes there, so that all that is unfinished goes.
+    locked: the caller has the lock of the folder and nobody else writes there or below, so that all unfinished goes.
     """
     with suppress(OSError):  # what cannot be removed is in nobody's way
         for one in list(folder.iterdir()):
-            if one.name.startswith(_SET_ASIDE):
-                named = one.with_name(one.name.removeprefix(_SET_ASIDE))
-                if not named.exists():
-                    one.rename(named)
-                    continue
-            elif not (found := _TEMPORARY.fullmatch(one.name)) or not (locked or _is_gone(**found.groupdict())):
-                continue
-            if one.is_dir() and not one.is_symlink():
-                shutil.rmtree(one, ignore_errors=True)
-            else:
-                one.unlink(missing_ok=True)
+            is_folder = one.is_dir() and not one.is_symlink()
+            found = _TEMPORARY.fullmatch(one.name)
+            named = one.with_name(one.name.removeprefix(_SET_ASIDE))
+            if named != one and not named.exists():
+                one.rename(named)
+            elif named != one or (found and (locked or _is_gone(**found.groupdict()))):
+                shutil.rmtree(one, ignore_errors=True) if is_folder else one.unlink(missing_ok=True)
+            elif locked and is_folder:
+                remove_leftovers(one, locked)
 
 
 def is_temporary(name: str) -> bool:

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
+from caster_gym.report.figures import save_figure
 from caster_gym.report.pages import join_parts
 from caster_gym.report.tables import markdown_table, write_csv
 from papers.scans import REPAIRS
@@ -149,7 +150,7 @@ def write_page(name: str, title: str, reference: str, sections: Sequence[Section
         for table in section.tables:
             write_csv(folder / f"{table.name}.csv", table.columns, table.rows)
         for picture in section.pictures:
-            picture.figure.savefig(folder / f"{picture.name}.png")
+            save_figure(picture.figure, folder / f"{picture.name}.png")
     write_csv(folder / "checks.csv", Check._fields, [check for section in sections for check in section.checks])
     write_csv(folder / "differences.csv", Difference._fields, [d for s in sections for d in s.differences])
     return _page(name, title, reference, sections)

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from caster_gym.configuration import did_you_mean
+from caster_gym.durable_files import MARK, write_file
 from caster_gym.report.provenance import write_provenance
-from caster_gym.report.run_folder import MARK, check_free, replace_file, staged
+from caster_gym.report.run_folder import check_free, staged
 from papers.page import Section, differences_page, printed_checks, unexplained, write_page
+
+FILES = ("*.csv", "*.png", "run.yaml")
 
 
 class Paper(NamedTuple):
@@ -82,18 +85,18 @@ def reproduce(name: str, out: Path, overwrite: bool, report: Callable[[str, int]
         report(work, done)
         sections.append(_build(place))
     report("done", len(sections))
-    with staged(out / name, overwrite) as fresh:
+    with staged(out / name, overwrite, FILES) as fresh:
         page = write_page(name, paper.title, paper.reference, sections, fresh)
         write_provenance(fresh, paper=name)
-    replace_file(out / f"{name}.md", page)
-    replace_file(out / "differences.md", differences_page(out, tuple(PAPERS)))
+    write_file(out / f"{name}.md", page)
+    write_file(out / "differences.md", differences_page(out, tuple(PAPERS)))
     printed = printed_checks(sections)
     return Verdict(sum(check.agrees for check in printed), len(printed), unexplained(sections))
 
 
 def _check_out(name: str, out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be had, and one with pages of the same names that are not ours."""
-    check_free(out / name, overwrite)
+    check_free(out / name, overwrite, FILES)
     page, differences = out / f"{name}.md", out / "differences.md"
     if page.exists() and not (out / name / MARK).is_file():
         raise ValueError(f"{page} is there already, and not from caster-gym; choose another --out")

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from caster_gym.agents.commands.command_line import progress
-from caster_gym.report.run_folder import MARK
+from caster_gym.durable_files import MARK
 from tests.command_calls import TASK, TINY, assert_refused
 
 
@@ -105,11 +105,11 @@ def test_results_are_not_overwritten(call, tmp_path, command):
 
 def test_overwrite_begins_with_an_empty_folder(call, tmp_path):
     (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "old.txt").write_text("old", encoding="utf-8")
+    (tmp_path / "results" / "learning.png").write_text("old", encoding="utf-8")
     (tmp_path / "results" / MARK).touch()
     result = call("evaluate", "computed_torque", "--task", "task.yaml", "--out", "results", "--overwrite")
     assert result.exit_code == 0, result.output
-    assert not (tmp_path / "results" / "old.txt").exists()
+    assert not (tmp_path / "results" / "learning.png").exists()
     assert (tmp_path / "results" / "table.md").is_file()
 
 

@@ -9,6 +9,7 @@ import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 from safetensors.torch import load_file, save_file
 
+from caster_gym import durable_files
 from caster_gym.agents.comparison.evaluation import roll_out
 from caster_gym.agents.learning import bundle as module
 from caster_gym.agents.learning.actor import Actor
@@ -23,6 +24,7 @@ from caster_gym.tasks.follow.parameters import FollowParameters
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.tasks.track.parameters import TrackParameters
 from caster_gym.wrappers import MotorLag, TwistCommands
+from tests.kills import killed_at_each_line
 
 ROBOT = load_robot("chung2008")
 TASK = TrackParameters(corridor=0.4)
@@ -238,15 +240,29 @@ def test_a_bundle_replaces_the_one_that_was_there_whole(tmp_path):
     assert_array_equal(load_policy(folder).agent.act(observations()), fresh_bundle(seed=2).agent.act(observations()))
 
 
-@pytest.mark.parametrize("failing", ["save_file", "yaml"])
+def test_a_bundle_that_is_saved_again_is_there_at_every_instant(tmp_path):
+    (tmp_path / "run").mkdir()
+    old, new = fresh_bundle(seed=1), fresh_bundle(seed=2)
+    save_bundle(tmp_path / "run" / "best", old)
+    left = killed_at_each_line(
+        [module, durable_files], tmp_path / "run", lambda: save_bundle(tmp_path / "run" / "best", new)
+    )
+    heads = [load_policy(one / "best").agent.actor.head.weight for one in left]
+    is_old = [torch.equal(head, old.agent.actor.head.weight) for head in heads]
+    assert is_old == sorted(is_old, reverse=True) and is_old[0] and not is_old[-1] and len(left) > 5
+    assert torch.equal(heads[-1], new.agent.actor.head.weight)
+    assert [one.name for one in (tmp_path / "run").iterdir()] == ["best"]
+
+
+@pytest.mark.parametrize("failing", ["write_file", "yaml"])
 def test_a_failure_while_saving_leaves_the_old_bundle(tmp_path, monkeypatch, failing):
     folder = saved(tmp_path, seed=1)
 
     def fail(*_, **__):
         raise OSError("no space left on device")
 
-    if failing == "save_file":
-        monkeypatch.setattr(module, "save_file", fail)
+    if failing == "write_file":
+        monkeypatch.setattr(module, "write_file", fail)
     else:
         monkeypatch.setattr(yaml, "safe_dump", fail)
     for target in (folder, tmp_path / "new"):

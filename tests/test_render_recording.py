@@ -1,6 +1,6 @@
 """caster_gym.render.recording: films that can be read again, whole or not there."""
 
-import tempfile
+from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
@@ -111,10 +111,10 @@ def test_a_folder_of_that_name_is_refused(tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
-    def refuse(**_):
+    def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(tempfile, "mkdtemp", refuse)  # not by its mode, since root may write anywhere
+    monkeypatch.setattr(Path, "mkdir", refuse)  # not by its mode, since root may write anywhere
     with pytest.raises(OSError, match=r"cannot write to folder .*: Permission denied"):
         check_target(tmp_path / "run.mp4")
 

@@ -1,21 +1,28 @@
 """Folders of results never take the place of anything but results."""
 
 import errno
-import tempfile
+import os
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from caster_gym.report.run_folder import MARK, begun, check_file, check_free, replace_file, staged
+from caster_gym import durable_files
+from caster_gym.durable_files import MARK, FolderInUseError, FolderLock, temporary_name, write_file
+from caster_gym.report import run_folder
+from caster_gym.report.run_folder import begun, check_file, check_free, staged
+from tests.kills import killed_at_each_line
+
+OURS = ("*.txt", "events", "best/policy.yaml")
 
 
 def test_a_folder_of_somebody_else_stays(tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     for overwrite, complaint in ((False, "is not empty"), (True, "does not hold results of caster-gym alone")):
-        with pytest.raises(ValueError, match=complaint), begun(tmp_path, overwrite, "*.txt"):
+        with pytest.raises(ValueError, match=complaint), begun(tmp_path, overwrite, "*.txt", ours=OURS):
             pass
-        with pytest.raises(ValueError, match=complaint), staged(tmp_path, overwrite):
+        with pytest.raises(ValueError, match=complaint), staged(tmp_path, overwrite, OURS):
             pass
     assert (tmp_path / "thesis.txt").read_text() == "mine"
 
@@ -24,13 +31,13 @@ def test_a_policy_that_is_to_be_read_is_not_deleted(tmp_path):
     (tmp_path / MARK).touch()
     (tmp_path / "best").mkdir()
     with pytest.raises(ValueError, match="lies in it"):
-        check_free(tmp_path, overwrite=True, kept=tmp_path / "best")
+        check_free(tmp_path, overwrite=True, ours=OURS, kept=(tmp_path / "best",))
 
 
 def test_staged_results_replace_the_old_ones_at_once(tmp_path):
     folder = tmp_path / "results"
     for text in ("first", "second"):
-        with staged(folder, overwrite=True) as fresh:
+        with staged(folder, overwrite=True, ours=OURS) as fresh:
             (fresh / f"{text}.txt").write_text(text)
     assert sorted(path.name for path in folder.iterdir()) == [MARK, "second.txt"]
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
@@ -38,36 +45,24 @@ def test_staged_results_replace_the_old_ones_at_once(tmp_path):
 
 def test_results_that_cannot_take_their_place_leave_the_old_ones(tmp_path, monkeypatch):
     folder = tmp_path / "results"
-    with staged(folder, overwrite=False) as fresh:
+    with staged(folder, overwrite=False, ours=OURS) as fresh:
         (fresh / "old.txt").touch()
-    rename = Path.rename
 
-    def interrupted(source, target):
-        if source.name == "results" and source != folder:
-            raise KeyboardInterrupt
-        return rename(source, target)
+    def fail(one, other):
+        raise OSError(errno.EBUSY, "Device or resource busy", str(other))
 
-    monkeypatch.setattr(Path, "rename", interrupted)
-    with pytest.raises(KeyboardInterrupt), staged(folder, overwrite=True) as fresh:
+    monkeypatch.setattr(durable_files, "_exchange", fail)
+    with pytest.raises(OSError, match="busy"), staged(folder, overwrite=True, ours=OURS) as fresh:
         (fresh / "new.txt").touch()
     assert sorted(path.name for path in folder.iterdir()) == [MARK, "old.txt"]
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
 
 
-def test_a_file_is_replaced_whole(tmp_path):
-    file = tmp_path / "page.md"
-    for text in ("first", "second"):
-        replace_file(file, text)
-    assert file.read_text(encoding="utf-8") == "second"
-    assert file.stat().st_mode & 0o777 == 0o644
-    assert list(tmp_path.iterdir()) == [file]
-
-
 def test_staged_results_that_fail_leave_the_old_ones(tmp_path):
     folder = tmp_path / "results"
-    with staged(folder, overwrite=False) as fresh:
+    with staged(folder, overwrite=False, ours=OURS) as fresh:
         (fresh / "old.txt").touch()
-    with pytest.raises(KeyboardInterrupt), staged(folder, overwrite=True) as fresh:
+    with pytest.raises(KeyboardInterrupt), staged(folder, overwrite=True, ours=OURS) as fresh:
         (fresh / "new.txt").touch()
         raise KeyboardInterrupt
     assert sorted(path.name for path in folder.iterdir()) == [MARK, "old.txt"]
@@ -84,11 +79,11 @@ def test_a_start_that_fails_leaves_nothing_in_the_way_of_the_next(tmp_path, erro
     folder = tmp_path / "runs" / "first"
     if there:
         folder.mkdir(parents=True)
-    with pytest.raises(error), begun(folder, overwrite=False, result="best/policy.yaml"):
+    with pytest.raises(error), begun(folder, overwrite=False, result="best/policy.yaml", ours=OURS):
         (folder / "events").touch()
         raise error
     assert folder.exists() == (tmp_path / "runs").exists() == there
-    with begun(folder, overwrite=False, result="best/policy.yaml"):
+    with begun(folder, overwrite=False, result="best/policy.yaml", ours=OURS):
         (folder / "events").touch()
     assert content(folder) == [MARK, "events"]
     assert content(tmp_path / "runs") == ["first"]
@@ -96,10 +91,10 @@ def test_a_start_that_fails_leaves_nothing_in_the_way_of_the_next(tmp_path, erro
 
 def test_a_start_that_fails_keeps_what_was_to_be_overwritten(tmp_path):
     folder = tmp_path / "run"
-    with begun(folder, overwrite=False, result="*.txt"):
+    with begun(folder, overwrite=False, result="*.txt", ours=OURS):
         (folder / "old.txt").write_text("a week of work")
-    with pytest.raises(ValueError, match="no such robot"), begun(folder, overwrite=True, result="*.txt"):
-        assert content(folder) == [MARK]
+    with pytest.raises(ValueError, match="no such robot"), begun(folder, overwrite=True, result="*.txt", ours=OURS):
+        assert content(folder) == [MARK, run_folder.BEFORE]
         raise ValueError("no such robot")
     assert content(folder) == [MARK, "old.txt"]
     assert (folder / "old.txt").read_text() == "a week of work"
@@ -108,9 +103,9 @@ def test_a_start_that_fails_keeps_what_was_to_be_overwritten(tmp_path):
 
 def test_what_a_run_has_finished_is_kept(tmp_path):
     folder = tmp_path / "run"
-    with begun(folder, overwrite=False, result="*.txt"):
+    with begun(folder, overwrite=False, result="*.txt", ours=OURS):
         (folder / "old.txt").touch()
-    with pytest.raises(KeyboardInterrupt), begun(folder, overwrite=True, result="*.txt"):
+    with pytest.raises(KeyboardInterrupt), begun(folder, overwrite=True, result="*.txt", ours=OURS):
         (folder / "new.txt").touch()
         raise KeyboardInterrupt
     assert content(folder) == [MARK, "new.txt"]
@@ -123,7 +118,7 @@ def test_files_that_a_run_reads_are_not_overwritten(tmp_path):
     task = tmp_path / "run" / "task.yaml"
     with (
         pytest.raises(ValueError, match=r"task\.yaml lies in it"),
-        begun(tmp_path / "run", overwrite=True, result="*", kept=(Path("ppo"), task)),
+        begun(tmp_path / "run", overwrite=True, result="*", kept=(Path("ppo"), task), ours=("*.yaml",)),
     ):
         pass
     assert task.is_file()
@@ -133,20 +128,23 @@ def out_of_reach(tmp_path, monkeypatch):
     """Folders that cannot be had, and a part of what is said about each."""
     (tmp_path / "file").touch()
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "to-file").symlink_to(tmp_path / "file")
     closed = tmp_path / "closed"
     closed.mkdir()
-    mkdir: Any = tempfile.TemporaryDirectory
+    mkdir = Path.mkdir
 
-    def refused(*arguments, dir=None, **options):
-        if Path(dir) == closed:
-            raise PermissionError(errno.EACCES, "Permission denied", str(dir))
-        return mkdir(*arguments, dir=dir, **options)
+    def refused(self, *arguments, **options):
+        if self.parent == closed:
+            raise PermissionError(errno.EACCES, "Permission denied", str(self))
+        mkdir(self, *arguments, **options)
 
-    monkeypatch.setattr(tempfile, "TemporaryDirectory", refused)  # permissions do not bind root
+    monkeypatch.setattr(Path, "mkdir", refused)  # permissions do not bind root
     return {
         tmp_path / "file": "file is not a folder",
         tmp_path / "file" / "run": "file is not a folder",
-        tmp_path / "link": "link is not a folder",
+        tmp_path / "to-file": "to-file is not a folder",
+        tmp_path / "link": "link is a link to nothing",
+        tmp_path / "link" / "run": "link is a link to nothing",
         closed / "a" / "run": "Permission denied",
         closed: "Permission denied",
         tmp_path / ("n" * 300): "File name too long",
@@ -156,29 +154,30 @@ def out_of_reach(tmp_path, monkeypatch):
 
 def test_a_folder_that_cannot_be_had_is_refused_before_the_work_begins(tmp_path, monkeypatch):
     for folder, why in out_of_reach(tmp_path, monkeypatch).items():
-        for opened in (begun(folder, False, "*"), staged(folder, overwrite=False)):
+        for opened in (begun(folder, False, "*"), staged(folder, overwrite=False, ours=OURS)):
             with pytest.raises(ValueError, match=f"^results cannot be written to .*: .*{why}; choose another --out$"):
                 opened.__enter__()
-    assert content(tmp_path) == ["closed", "file", "link"]
+    assert content(tmp_path) == ["closed", "file", "link", "to-file"]
 
 
 def test_advice_on_folders_that_are_not_empty_helps(tmp_path):
     """--overwrite is named where it would be accepted, and not elsewhere."""
     (tmp_path / "ours").mkdir()
-    (tmp_path / "ours" / MARK).touch()
+    for name in (MARK, "old.txt", ".DS_Store"):
+        (tmp_path / "ours" / name).touch()
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs" / "thesis.txt").touch()
     with pytest.raises(ValueError, match="or add --overwrite to delete what is in it"):
-        check_free(tmp_path / "ours", overwrite=False)
-    check_free(tmp_path / "ours", overwrite=True)
+        check_free(tmp_path / "ours", overwrite=False, ours=OURS)
+    check_free(tmp_path / "ours", overwrite=True, ours=OURS)
     with pytest.raises(ValueError, match="theirs is not empty; choose another --out") as caught:
-        check_free(tmp_path / "theirs", overwrite=False)
+        check_free(tmp_path / "theirs", overwrite=False, ours=OURS)
     assert "--overwrite" not in str(caught.value)
 
 
 def test_an_empty_working_folder_may_hold_the_results(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with staged(Path(), overwrite=False) as fresh:
+    with staged(Path(), overwrite=False, ours=OURS) as fresh:
         (fresh / "page.md").touch()
     assert content(Path()) == [MARK, "page.md"]
     assert Path("page.md").samefile(tmp_path / "page.md")
@@ -195,3 +194,217 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path):
             check_file(file, False, "--mjcf")
     check_file(tmp_path / "there.xml", True, "--mjcf")
     check_file(tmp_path / "new.xml", False, "--mjcf")
+
+
+def run_with_results(folder, text):
+    """A finished run, with files of several kinds."""
+    with begun(folder, overwrite=False, result="best/policy.yaml", ours=OURS):
+        (folder / "best").mkdir()
+        for name in ("events", "best/policy.yaml"):
+            (folder / name).write_text(text)
+
+
+def overwrite_with_results(folder, fails):
+    with begun(folder, overwrite=True, result="best/policy.yaml", ours=OURS):
+        write_file(folder / "events", "new")
+        if fails:
+            raise ValueError("no such robot")
+        (folder / "best").mkdir()
+        write_file(folder / "best" / "policy.yaml", "new")
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_run_that_is_killed_loses_neither_old_nor_new_results(tmp_path, fails):
+    """Killed before any line, what the next start finds is the old run, whole, or the results of the new one."""
+    (tmp_path / "place").mkdir()
+    folder = tmp_path / "place" / "run"
+    run_with_results(folder, "old")
+
+    def overwrite():
+        try:
+            overwrite_with_results(folder, fails)
+        except ValueError:
+            assert fails
+
+    left = killed_at_each_line([run_folder, durable_files], tmp_path / "place", overwrite)
+    found = []
+    for one in left:
+        with pytest.raises(KeyboardInterrupt), begun(one / "run", True, "best/policy.yaml", ours=OURS):
+            raise KeyboardInterrupt
+        assert content(one / "run") == [MARK, "best", "events"]
+        found.append((one / "run" / "best" / "policy.yaml").read_text())
+        assert (one / "run" / "events").read_text() == found[-1]
+    assert len(found) > 15 and found[0] == "old"
+    assert set(found) == ({"old"} if fails else {"old", "new"})
+
+
+def test_what_was_set_aside_is_not_lost_to_another_command(tmp_path):
+    """A run of one kind was killed as it began to overwrite; a command of another kind must not delete the old one."""
+    run_with_results(tmp_path / "run", "old")
+    (tmp_path / "run" / run_folder.BEFORE).mkdir()
+    for name in ("events", "best"):
+        (tmp_path / "run" / name).rename(tmp_path / "run" / run_folder.BEFORE / name)
+    for overwrite, why in ((False, "is not empty"), (True, "is not a file that this command writes")):
+        with pytest.raises(ValueError, match=why), staged(tmp_path / "run", overwrite, ("*.csv",)):
+            pass
+    assert (tmp_path / "run" / run_folder.BEFORE / "best" / "policy.yaml").read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["notes.md", "best/notes.txt", "best/deep/policy.yaml", ".hidden"])
+def test_a_file_that_is_not_ours_is_named_and_nothing_is_deleted(tmp_path, name):
+    folder = tmp_path / "run"
+    run_with_results(folder, "old")
+    (folder / name).parent.mkdir(exist_ok=True)
+    (folder / name).write_text("mine")
+    for opened in (begun(folder, True, "*", ours=OURS), staged(folder, True, OURS)):
+        with pytest.raises(ValueError, match=f"since {folder / name} is not a file that this command writes"), opened:
+            pass
+    assert (folder / name).read_text() == "mine" and (folder / "events").read_text() == "old"
+
+
+def test_what_a_person_puts_into_the_folder_of_a_run_that_fails_stays(tmp_path):
+    folder = tmp_path / "run"
+    run_with_results(folder, "old")
+    with pytest.raises(ValueError, match="no such robot"), begun(folder, True, "best/policy.yaml", ours=OURS):
+        (folder / "best").mkdir()
+        for name in ("events", "best/notes.md"):
+            (folder / name).write_text("mine")
+        raise ValueError("no such robot")
+    assert (folder / "best" / "notes.md").read_text() == "mine"
+    assert (folder / "events").read_text() == (folder / "best" / "policy.yaml").read_text() == "old"
+    assert content(folder) == [MARK, "best", "events"]
+
+
+def test_a_link_that_is_in_the_way_is_not_ours(tmp_path):
+    """Neither it nor what it leads to is deleted."""
+    folder = tmp_path / "run"
+    run_with_results(folder, "old")
+    (folder / "state").symlink_to(tmp_path)
+    with (
+        pytest.raises(ValueError, match="state is not a file that this command writes"),
+        staged(folder, True, (*OURS, "state/*")),
+    ):
+        pass
+    assert (folder / "state").is_symlink()
+
+
+HOLD = """
+import sys
+from pathlib import Path
+from caster_gym.report.run_folder import begun
+with begun(Path(sys.argv[1]), False, "*.txt"):
+    (Path(sys.argv[1]) / "a.txt").touch()
+    print("begun", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_run_in_use_is_neither_joined_nor_overwritten_nor_resumed(tmp_path):
+    folder = tmp_path / "run"
+    command = [sys.executable, "-c", HOLD, str(folder)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None and other.stdout.readline() == b"begun\n"
+        for opened in (
+            begun(folder, True, "*", ours=OURS),
+            begun(folder, False, "*", ours=OURS, resume=True),
+            staged(folder, True, OURS),
+        ):
+            with pytest.raises(FolderInUseError, match=f"{folder} is in use by process {other.pid}"), opened:
+                pass
+        other.kill()
+    assert content(folder) == [MARK, "a.txt"]
+    with FolderLock(folder, patience=10.0), begun(folder, True, "*", ours=OURS):
+        assert content(folder) == [MARK, run_folder.BEFORE]
+    assert content(folder) == [MARK]
+
+
+def test_a_resumed_run_finds_what_is_there_and_leaves_it(tmp_path):
+    folder = tmp_path / "run"
+    with pytest.raises(ValueError, match="no such robot"), begun(folder, False, "best/*", ours=OURS, resume=True):
+        (folder / "events").write_text("a new one")
+        raise ValueError("no such robot")
+    assert not folder.exists()  # there was nothing to resume
+    run_with_results(folder, "old")
+    (folder / "best").rename(folder / "unfinished")
+    (folder / "unfinished" / temporary_name()).mkdir()  # as a killed process leaves it
+    for error in (ValueError, KeyboardInterrupt):
+        with pytest.raises(error), begun(folder, False, "best/*", ours=OURS, resume=True):
+            assert content(folder) == [MARK, "events", "unfinished"]
+            raise error
+    assert content(folder) == [MARK, "events", "unfinished"]
+    assert content(folder / "unfinished") == ["policy.yaml"]
+
+
+def test_only_folders_of_ours_are_resumed(tmp_path):
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(ValueError, match="is not empty"), begun(tmp_path, False, "*", ours=OURS, resume=True):
+        pass
+    assert content(tmp_path) == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("how", ["begun", "staged"])
+def test_a_link_to_a_folder_stays_and_leads_to_the_results(tmp_path, how):
+    (tmp_path / "disk" / "runs").mkdir(parents=True)
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "disk" / "runs")
+    for out, overwrite in ((link, False), (link, True), (link / "a", False), (link / "a", True)):
+        if out.name == "a":
+            (link / "events").unlink(missing_ok=True)
+        if how == "begun":
+            with begun(out, overwrite, "*", ours=(*OURS, "a/*")):
+                (out / "events").touch()
+        else:
+            with staged(out, overwrite, (*OURS, "a/*")) as fresh:
+                (fresh / "events").touch()
+        assert link.is_symlink() and content(out) == [MARK, "events"]
+        assert content(tmp_path) == ["disk", "link"] and content(tmp_path / "disk") == ["runs"]
+
+
+def test_a_link_to_the_input_is_seen_through(tmp_path):
+    run_with_results(tmp_path / "run", "old")
+    (tmp_path / "link").symlink_to(tmp_path / "run")
+    for read in (tmp_path / "run" / "best", tmp_path / "link" / "best"):
+        for out in (tmp_path / "run", tmp_path / "link"):
+            with pytest.raises(ValueError, match="lies in it"):
+                check_free(out, True, OURS, (read,))
+
+
+@pytest.mark.parametrize("how", ["begun", "staged"])
+def test_the_working_folder_may_hold_results_but_is_not_overwritten(tmp_path, monkeypatch, how):
+    monkeypatch.chdir(tmp_path)
+
+    def write(overwrite):
+        if how == "begun":
+            with begun(Path(), overwrite, "*", ours=OURS):
+                Path("events").touch()
+        else:
+            with staged(Path(), overwrite, OURS) as fresh:
+                (fresh / "events").touch()
+
+    write(overwrite=False)
+    assert content(Path()) == [MARK, "events"] and Path("events").samefile(tmp_path / "events")
+    with pytest.raises(ValueError, match=r"^\. is not overwritten, since .* lies in it; choose another --out"):
+        write(overwrite=True)
+    assert content(Path()) == [MARK, "events"]
+
+
+def test_the_next_start_removes_what_killed_ones_left(tmp_path, monkeypatch):
+    """Beside the folder, where results were staged, and in it."""
+    (tmp_path / temporary_name()).mkdir()
+    (tmp_path / "run" / "best").mkdir(parents=True)
+    for place in ("run", "run/best"):
+        (tmp_path / place / temporary_name()).touch()
+    (tmp_path / "run" / MARK).touch()
+    monkeypatch.setattr(durable_files, "_PROCESS", "0" * 8)  # another process, with the same number
+    with staged(tmp_path / "run", True, OURS) as fresh:
+        (fresh / "a.txt").touch()
+    assert content(tmp_path) == ["run"] and content(tmp_path / "run") == [MARK, "a.txt"]
+
+
+def test_a_device_is_not_written_over(tmp_path):
+    os.mkfifo(tmp_path / "pipe.xml")
+    (tmp_path / "link.xml").symlink_to(tmp_path / "no" / "a.xml")
+    for name, why in (("pipe.xml", "not a file but a device"), ("link.xml", "there is no folder '.*no' to write")):
+        for overwrite in (False, True):
+            with pytest.raises(ValueError, match=why):
+                check_file(tmp_path / name, overwrite, "--mjcf")

@@ -7,12 +7,13 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator
 
+from caster_gym.agents.comparison import results
 from caster_gym.agents.comparison.evaluation import bare, evaluation_batch
 from caster_gym.agents.comparison.results import Contender, compare, write_results
 from caster_gym.agents.comparison.task_settings import Seed, TaskSettings
 from caster_gym.agents.comparison.validation import read_history, tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
-from caster_gym.agents.learning import usual_names
+from caster_gym.agents.learning import training, usual_names
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
@@ -22,6 +23,8 @@ from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.file_names import NameOrFile
 from caster_gym.report.provenance import write_provenance
 from caster_gym.shipped_files import read_settings
+
+FILES = (*results.FILES, "run.yaml", *(f"policies/*/{name}" for name in training.FILES))
 
 
 class BenchmarkSettings(Frozen):

@@ -24,6 +24,7 @@ from caster_gym.agents.commands.command_line import (
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.registry import read_agent
+from caster_gym.durable_files import write_file
 from caster_gym.report.run_folder import begun, check_file
 from caster_gym.shipped_files import read_settings
 
@@ -66,6 +67,7 @@ def train(
     """Train a policy. Save the one that is best on the validation paths in OUT/best, for `evaluate` and `watch`."""
     with plain_errors():
         from caster_gym.agents.comparison.metrics import in_words
+        from caster_gym.agents.learning.training import FILES
         from caster_gym.agents.learning.training import train as run
 
         settings = read_agent(agent, changes_of(change))
@@ -79,7 +81,7 @@ def train(
             "unit": "step",
             "unit_scale": True,
         }
-        with begun(out, overwrite, "best/policy.yaml", kept), progress(**bar) as show:
+        with begun(out, overwrite, "best/policy.yaml", kept, FILES), progress(**bar) as show:
 
             def report(steps: int, verdict: str) -> None:
                 show(min(steps, settings.n_timesteps), verdict)
@@ -119,12 +121,12 @@ def benchmark(
 ) -> None:
     """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
     with plain_errors():
-        from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_comparison, run_benchmark
+        from caster_gym.agents.commands.benchmark import FILES, BenchmarkSettings, read_comparison, run_benchmark
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
         named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
-        with begun(out, overwrite, "policies/*/best/policy.yaml", kept=named):
+        with begun(out, overwrite, "policies/*/best/policy.yaml", named, FILES):
             text = run_benchmark(comparison, out, threads)
         typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")
@@ -258,7 +260,7 @@ def export(
             raise ValueError(f"what is written is MJCF, for MuJoCo, got the name {mjcf.name!r}; call it {better!r}")
         text = model(load_robot(robot), time_step, friction)
         check_file(mjcf, overwrite, "--mjcf")
-        mjcf.write_text(text, encoding="utf-8")
+        write_file(mjcf, text)
         typer.echo(f"The model is in {mjcf}.")
 
 

@@ -6,19 +6,18 @@ from caster_gym.agents.commands.benchmark import BenchmarkSettings
 from caster_gym.agents.commands.command_line import files_among
 from caster_gym.agents.commands.selection import choose_agent, choose_task
 from caster_gym.agents.comparison.evaluation import evaluation_batch
-from caster_gym.agents.comparison.results import Contender, compare, write_results
+from caster_gym.agents.comparison.results import FILES, Contender, compare, write_results
 from caster_gym.engines.tensor.threads import limit_threads
 from caster_gym.report.provenance import write_provenance
-from caster_gym.report.run_folder import check_free, staged
+from caster_gym.report.run_folder import staged
 
 
 def evaluate(policy: str, task: str | None, starts: int, out: Path, overwrite: bool, threads: int) -> str:
     """Write table, episodes and figures of an agent into the folder `out`; returns the table."""
     settings, words = choose_task(policy, task)
     how = BenchmarkSettings(agents=(policy,), starts=starts)
-    for read in files_among(task, settings.robot):
-        check_free(out, overwrite, kept=read)
-    with limit_threads(threads), staged(out, overwrite, kept=Path(policy)) as folder:
+    kept = (Path(policy), *files_among(task, settings.robot))
+    with limit_threads(threads), staged(out, overwrite, (*FILES, "run.yaml"), kept) as folder:
         test = evaluation_batch(settings, settings.test, starts)
         agent, tuned = choose_agent(policy, settings, test)
         compared = compare([Contender(agent.name, agent, None)], test, how.start_seed)

@@ -9,7 +9,7 @@ import numpy as np
 
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.envs.plan import Plan
-from caster_gym.report.figures import COLOURS, legend_below, new_figure
+from caster_gym.report.figures import COLOURS, legend_below, new_figure, save_figure
 from caster_gym.tasks.episodes import Episodes
 from caster_gym.tasks.measuring import Printed, shown
 from caster_gym.tasks.task import Pictures
@@ -84,7 +84,7 @@ def write_figures(
 
     written = [folder / f"{name}.png" for name in figures]
     for path, figure in zip(written, figures.values(), strict=True):
-        figure.savefig(path)
+        save_figure(figure, path)
     return written
 
 

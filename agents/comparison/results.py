@@ -11,7 +11,13 @@ from caster_gym.agents.comparison.figures import write_figures
 from caster_gym.agents.comparison.summary import Result, table, write_episodes, write_summary
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.protocol import Agent
+from caster_gym.durable_files import write_file
 from caster_gym.tasks.episodes import Episodes
+
+FILES = (
+    *("table.md", "episodes.csv", "summary.csv"),
+    *(f"{name}.png" for name in ("paths", "speeds", "errors", "torques", "learning", "overview")),
+)
 
 
 class Contender(NamedTuple):
@@ -58,6 +64,6 @@ def write_results(
     text = "\n\n".join([*([words] if words else []), table(results, confidence)])
     write_episodes(folder / "episodes.csv", results)
     write_summary(folder / "summary.csv", results, confidence)
-    (folder / "table.md").write_text(text + "\n", encoding="utf-8")
+    write_file(folder / "table.md", text + "\n")
     write_figures(folder, episodes, histories, bare(test).engine.plan, bare(test).definition.pictures)
     return text

@@ -4,8 +4,6 @@ policy.yaml            what the policy is, for which robot and task, and how it 
 weights.safetensors    the actor's weights
 """
 
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -16,11 +14,12 @@ import yaml
 from numpy.typing import NDArray
 from pydantic import PositiveInt, SerializeAsAny
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 
 from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
+from caster_gym.durable_files import replace_folder, scratch_folder, write_file
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import Robot
 from caster_gym.tasks.building import observation_layout
@@ -130,22 +129,14 @@ def _named(features: Sequence[Feature]) -> str:
 
 
 def save_bundle(folder: Path, bundle: Bundle) -> None:
-    """Write a bundle to a folder that comes into being whole or not at all; one that is there is replaced."""
+    """Write a bundle to a folder that comes into being whole or not at all; one that is there is replaced at once."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
+    with scratch_folder(folder.parent) as fresh:
         weights = {name: tensor.contiguous() for name, tensor in bundle.agent.actor.state_dict().items()}
-        save_file(weights, fresh / WEIGHTS)
+        write_file(fresh / WEIGHTS, save(weights))
         content = bundle.description.model_dump(mode="json")
-        (fresh / DESCRIPTION).write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
-        fresh.chmod(0o755)
-        old = fresh.with_name(fresh.name + "-old")
-        if folder.exists():
-            folder.replace(old)
-        fresh.replace(folder)
-        shutil.rmtree(old, ignore_errors=True)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+        write_file(fresh / DESCRIPTION, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+        replace_folder(fresh, folder)
 
 
 def load_policy(folder: str | Path) -> Bundle:

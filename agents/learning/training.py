@@ -15,12 +15,18 @@ from tqdm import tqdm
 
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation
+from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training_run import Report, Run
 from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.own_errors import in_own_code
 from caster_gym.report.provenance import write_provenance
+
+FILES = (
+    *("run.yaml", "validation.csv", "progress.csv", "events.out.tfevents.*", "state/*"),
+    *(f"{folder}/{name}" for folder in ("best", "checkpoints/*") for name in (DESCRIPTION, WEIGHTS)),
+)  # patterns of what is in the folder of a run
 
 
 def train(

@@ -12,15 +12,17 @@ from caster_gym.design.figures import write_design_figure
 from caster_gym.design.search import Design, DesignTarget, check_designable, optimise
 from caster_gym.design.sizing import MotorRequirement, Requirement, require
 from caster_gym.design.target import driven_as
+from caster_gym.durable_files import write_file
 from caster_gym.file_names import NameOrFile, from_working_folder, with_files_beside
 from caster_gym.report.pages import join_parts
 from caster_gym.report.provenance import write_provenance
 from caster_gym.report.robot_files import robot_yaml
-from caster_gym.report.run_folder import check_free, staged
+from caster_gym.report.run_folder import staged
 from caster_gym.report.tables import markdown_table, write_csv
 from caster_gym.robot import Robot, load_robot
 from caster_gym.shipped_files import find
 
+FILES = ("design.md", "motors.csv", "design.png", "robot.yaml", "run.yaml")
 COLUMNS: dict[str, Callable[[MotorRequirement, MotorRequirement], object]] = {  # of a motor after and before
     "joint": lambda after, _: after.joint,
     "torque_Nm": lambda after, _: after.torque,
@@ -103,8 +105,7 @@ def design(settings: DesignSettings, out: Path, overwrite: bool, report: Callabl
 
     report is told the share of the work that is done.
     """
-    check_free(out, overwrite, kept=Path(settings.robot))
-    with staged(out, overwrite) as folder:
+    with staged(out, overwrite, FILES, kept=(Path(settings.robot),)) as folder:
         made = make_design(settings, report)
         write_design(made, folder)
     return in_words(made)
@@ -129,9 +130,9 @@ def write_design(report: DesignReport, folder: Path) -> str:
         f"{report.original.name} with wheels of {1e3 * report.design.radius:.1f} mm radius and "
         f"{1e3 * report.design.trail:.1f} mm trail, by `caster-gym design`; its motors are those of the original."
     )
-    (folder / "robot.yaml").write_text(robot_yaml(report.design.robot, remark), encoding="utf-8")
+    write_file(folder / "robot.yaml", robot_yaml(report.design.robot, remark))
     write_provenance(folder, settings=report.settings.model_dump(mode="json"))
-    (folder / "design.md").write_text(text, encoding="utf-8")
+    write_file(folder / "design.md", text)
     return text
 
 

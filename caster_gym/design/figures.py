@@ -8,7 +8,7 @@ import numpy as np
 
 from caster_gym.design.search import Design, DesignTarget, wheel_room
 from caster_gym.design.sizing import MotorRequirement, Requirement
-from caster_gym.report.figures import COLOURS, empty_figure, legend_below
+from caster_gym.report.figures import COLOURS, empty_figure, legend_below, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ def write_design_figure(path: Path, target: DesignTarget, design: Design, requir
     powers.set_xticks(range(len(motors)), [m.joint for m in motors], rotation=30, ha="right")
     right.suptitle(f"motors of the best design, margin {target.margin:g} included", fontsize="medium")
     legend_below(right, torques, 3, fontsize="small")
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_objective(axis: "Axes", target: DesignTarget, design: Design) -> None:

@@ -12,6 +12,7 @@ import yaml
 from pydantic import Field, PositiveFloat
 
 from caster_gym.configuration import Frozen, parse
+from caster_gym.durable_files import write_file
 from caster_gym.identification.recording import KIND_UNITS, Noise, record, write_recording
 from caster_gym.identification.recording_check import ContradictionError, check_recording
 from caster_gym.identification.recording_table import read_recording
@@ -36,6 +37,7 @@ from caster_gym.robot import load_robot
 if TYPE_CHECKING:
     from caster_gym.identification.fit import Identification
 
+FILES = ("identified.md", "identified.csv", "identified.png", "robot.yaml", "features.yaml", "run.yaml")
 PAYLOAD = ("payload_mass", "payload_x", "payload_y")
 EXAMPLE_NOISE = Noise(position=1e-3, heading=2e-3, velocity=1e-2, yaw_rate=1e-2, steering=2e-3, rolling=2e-3)
 EXAMPLE_SECONDS, EXAMPLE_STEP = 10.0, 0.02
@@ -73,8 +75,8 @@ def identify_file(
 
     report is called before each step of the fit.
     """
-    for kept in (recording, Path(settings.robot)):
-        check_free(out, overwrite, kept=kept)
+    kept = (recording, Path(settings.robot))
+    check_free(out, overwrite, FILES, kept)
     robot = load_robot(settings.robot)
     unknowns(robot, settings.unknowns, settings.start, settings.bounds)
     check_alike(robot, [*settings.unknowns, *settings.start])
@@ -84,7 +86,7 @@ def identify_file(
             check_recording(recorded, robot, each_named(robot, settings.unknowns), settings.start)
         except ContradictionError as error:
             raise ContradictionError(f"{recording}: {error}") from None
-    with staged(out, overwrite) as folder:
+    with staged(out, overwrite, FILES, kept) as folder:
         from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
         from caster_gym.identification.fit import identify  # late: Torch takes seconds
 
@@ -134,10 +136,10 @@ def write_identification(found: "Identification", recording: Path, settings: Ide
     names = ", ".join(one.name for one, told in zip(found.unknowns, found.is_told, strict=True) if told) or "nothing"
     remark = f"{found.robot.name} as identified from {recording.name} by `caster-gym identify`: {names}."
     text = robot_yaml(found.robot, remark, "A payload is part of the platform.")
-    (folder / "robot.yaml").write_text(text, encoding="utf-8")
-    (folder / "features.yaml").write_text(features_yaml(found, recording), encoding="utf-8")
+    write_file(folder / "robot.yaml", text)
+    write_file(folder / "features.yaml", features_yaml(found, recording))
     write_provenance(folder, recording=str(recording), settings=settings.model_dump(mode="json"))
-    (folder / "identified.md").write_text(page(found, recording), encoding="utf-8")
+    write_file(folder / "identified.md", page(found, recording))
 
 
 def features_yaml(found: "Identification", recording: Path) -> str:

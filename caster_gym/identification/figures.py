@@ -10,7 +10,7 @@ from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
 from caster_gym.identification.fit import Identification
 from caster_gym.identification.recording import KIND_UNITS
-from caster_gym.report.figures import COLOURS, legend_below, new_figure
+from caster_gym.report.figures import COLOURS, legend_below, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,7 @@ def write_identify_figure(path: Path, found: Identification) -> None:
     figure.axes[0].set_title("measured and predicted", fontsize="medium")
     figure.axes[1].set_title("predicted minus measured", fontsize="medium")
     legend_below(figure, figure.axes[0], 3)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 _LABELS = ("predicted with the starting values", "predicted with the estimates")

@@ -1,10 +1,9 @@
 """Writes frames to a video file, .mp4 or .gif, which appears whole or not at all."""
 
-import shutil
-import tempfile
+import os
 import zlib
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
@@ -13,6 +12,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 
 from caster_gym.arrays import Frame
+from caster_gym.durable_files import move_file, remove_leftovers, scratch_folder
 
 SUFFIXES = (".mp4", ".gif")
 MOST_COLOURS = 160  # of a GIF, for the whole film
@@ -65,20 +65,20 @@ def recording(file: Path, fps: float, overwrite: bool = False) -> Iterator[Write
         except BaseException:
             writer.give_up()
             raise
-        unfinished.replace(file)
+        move_file(unfinished, file)
 
 
 @contextmanager
 def _scratch_folder(file: Path) -> Iterator[Path]:
     """A folder beside the file, so that what is finished there can be renamed."""
-    try:
-        folder = Path(tempfile.mkdtemp(prefix=f".{file.stem}-", dir=file.absolute().parent))
-    except OSError as error:
-        raise OSError(f"cannot write to folder {str(file.absolute().parent)!r}: {error.strerror}") from None
-    try:
+    home = Path(os.path.realpath(file)).parent
+    with ExitStack() as stack:
+        try:
+            remove_leftovers(home)
+            folder = stack.enter_context(scratch_folder(home))
+        except OSError as error:
+            raise OSError(f"cannot write to folder {str(home)!r}: {error.strerror}") from None
         yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _refuse_odd(width: int, height: int) -> None:

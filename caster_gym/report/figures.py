@@ -1,6 +1,10 @@
 """The style of all figures: size, resolution, grid, colours of lines, and a legend for the whole figure."""
 
+import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from caster_gym.durable_files import write_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,10 +25,17 @@ def new_figure(rows: int = 1, columns: int = 1, size: tuple[float, float] = (4.6
 
 
 def empty_figure(size: tuple[float, float]) -> "Figure":
-    """A figure of a size [in] without axes; `savefig(path)` writes it. It needs no display and need not be closed."""
+    """A figure of a size [in] without axes, for `save_figure`. It needs no display and need not be closed."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=size, dpi=DOTS_PER_INCH, layout="constrained")
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write a figure as a PNG file."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png")
+    write_file(path, picture.getvalue())
 
 
 def legend_below(figure: Any, axis: "Axes", columns: int, **options: Any) -> None:

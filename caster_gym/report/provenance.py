@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 import caster_gym
+from caster_gym.durable_files import write_file
 
 PACKAGES = ("numpy", "numba", "gymnasium", "torch", "stable-baselines3", "scipy")
 
@@ -58,7 +59,7 @@ def write_provenance(folder: Path, **content: Any) -> None:
     program = Path(sys.argv[0])
     name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
     full = {"command": " ".join([name, *sys.argv[1:]]), "versions": versions(), **content}
-    (folder / "run.yaml").write_text(yaml.safe_dump(full, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    write_file(folder / "run.yaml", yaml.safe_dump(full, sort_keys=False, allow_unicode=True))
 
 
 def _git(folder: Path, *arguments: str) -> str:

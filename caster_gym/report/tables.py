@@ -1,8 +1,11 @@
 """Tables for readers, in Markdown, and for programs, as CSV files."""
 
 import csv
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from caster_gym.durable_files import write_file
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[object]], padded: bool = False) -> str:
@@ -17,10 +20,11 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[object]], pad
 
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """A table as a CSV file in UTF-8, its first line the names of the columns; floats with all their digits."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    write_file(path, text.getvalue())
 
 
 def _cell(cell: object) -> str:
