@@ -4,6 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 PYTEST := $(BIN)/python -m pytest --numprocesses logical --dist loadfile --no-loadscope-reorder
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PYTHONDONTWRITEBYTECODE :=  # else each of the many processes of the tests compiles all that it imports
 
 LOWEST := .venv-lowest
 LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_splines paths_specification \
@@ -11,7 +12,7 @@ LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_spl
   engines_native_compiled_files tasks_track_environment agents_comparison_task_settings \
   agents_learning_bundle report_run_folder wrappers_specification
 
-.PHONY: help install benchmark pictures papers test quick papers-test lowest lint format clean
+.PHONY: help install benchmark pictures papers test quick papers-test lowest lint style format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
@@ -36,8 +37,10 @@ papers: $(INSTALLED) ## Both papers reproduced: pages, figures and tables in doc
 	$(BIN)/python -m papers chung2008 --out docs/papers --overwrite
 	$(BIN)/python -m papers kim2001 --out docs/papers --overwrite
 
-test: lint ## Lint, then all tests, a worker on each core
-	$(PYTEST)
+test: style ## Style, then all tests, a worker on each core, with types beside them
+	@$(BIN)/mypy > .venv/types.txt 2>&1 & types=$$!; \
+	$(PYTEST); failed=$$?; \
+	wait $$types || failed=1; cat .venv/types.txt; exit $$failed
 
 quick: $(INSTALLED) ## The fast tests alone, in less than 90 s on two cores once their code is compiled
 	$(PYTEST) -m "not slow" --ignore tests/papers
@@ -53,10 +56,12 @@ $(LOWEST)/installed: pyproject.toml setup.py constraints-lowest.txt
 	$(LOWEST)/bin/python -m pip install --quiet -c constraints-lowest.txt -e '.[test]'
 	@touch $@
 
-lint: $(INSTALLED) ## Style and types
+lint: style ## Style and types
+	$(BIN)/mypy
+
+style: $(INSTALLED) ## Style alone
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
 
 format: $(INSTALLED) ## Bring the sources into shape
 	$(BIN)/ruff check --fix

@@ -195,7 +195,10 @@ def test_an_error_in_a_training_process_is_raised(tmp_path, settings, task):
         train_all([Job("ppo seed 0", task, agent, 0, tmp_path / "taken" / "run")])
 
 
-@pytest.mark.parametrize(("threads", "processes"), [((), 5), ((1,), 5), ((4,), 4), ((64,), 1)])
+@pytest.mark.parametrize(
+    ("threads", "processes"),
+    [((), 5), ((4,), 4), pytest.param((1,), 5, marks=pytest.mark.slow), pytest.param((64,), 1, marks=pytest.mark.slow)],
+)
 def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, threads, processes):
     """Each training run has one thread or those asked for; cores only say how many run at a time."""
     pools, submitted = [], []
@@ -327,6 +330,7 @@ def blocks(section, language):
     )
 
 
+@pytest.mark.slow
 def test_agents_of_ones_own_take_part_as_contributing_tells(tmp_path, settings, monkeypatch):
     """The controller and the learner of that page, as they stand there, beside computed torque."""
     monkeypatch.syspath_prepend(tmp_path / "elsewhere")  # restores sys.path afterwards

@@ -103,6 +103,7 @@ def test_results_are_not_overwritten(call, tmp_path, command):
     assert (tmp_path / "results" / "precious.txt").read_text(encoding="utf-8") == "a week of work"
 
 
+@pytest.mark.slow
 def test_overwrite_begins_with_an_empty_folder(call, tmp_path):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "learning.png").write_text("old", encoding="utf-8")

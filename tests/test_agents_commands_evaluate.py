@@ -93,6 +93,7 @@ def test_a_folder_that_is_no_policy_is_refused(call, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_folders_that_hold_policies_say_where(trained, call, tmp_path):
     """And what is advised is accepted."""
     shutil.copytree(trained[1], tmp_path / "runs" / "first")

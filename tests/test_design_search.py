@@ -114,6 +114,7 @@ def test_no_design_of_a_grid_needs_less_torque(light):
     assert light.value < light.own[2]
 
 
+@pytest.mark.slow
 def test_least_torque_runs_to_the_smallest_wheels_and_trails_and_pays_in_speed(light, strong):
     """Torques are forces times radius or trail; the rolling motors turn faster in inverse proportion to the radius."""
     assert light.bounds == ("the least radius", "the least trail")

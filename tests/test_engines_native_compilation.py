@@ -163,6 +163,7 @@ def fleets(tmp_path_factory):
     return run(ROOT), run(ROOT), run(copy), folder
 
 
+@pytest.mark.slow
 def test_the_first_process_compiles_and_says_so(fleets):
     (_, hits, misses), told = fleets[0]
     assert (hits, misses) == (0, 1)
@@ -170,15 +171,18 @@ def test_the_first_process_compiles_and_says_so(fleets):
     assert told.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("process", [1, 2], ids=["the same environment", "another environment"])
 def test_the_next_process_compiles_nothing_and_says_nothing(fleets, process):
     (_, hits, misses), told = fleets[process]
     assert (hits, misses, told) == (1, 0, "")
 
 
+@pytest.mark.slow
 def test_the_other_environment_lies_elsewhere(fleets):
     assert fleets[0][0][0] != fleets[2][0][0]
 
 
+@pytest.mark.slow
 def test_compiled_code_lies_in_the_cache_of_the_user(fleets):
     assert list((fleets[3] / "user" / "caster_gym").rglob("*.nbc"))

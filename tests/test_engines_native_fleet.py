@@ -42,7 +42,7 @@ def random_torques(seed, count, caster_count=3):
     return np.random.default_rng((seed, 1)).uniform(-0.5, 0.5, (count, 2 * caster_count))
 
 
-@pytest.mark.parametrize("caster_count", [3, 4])
+@pytest.mark.parametrize("caster_count", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_each_robot_of_a_fleet_moves_as_its_model_says(caster_count):
     """Robots with different parameters in one compiled call; NumPy and Torch move them one by one."""
     robots = different_robots(5, caster_count)

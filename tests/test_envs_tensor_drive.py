@@ -34,6 +34,7 @@ def test_substeps_one_by_one_are_all_of_them_at_once(floor):
     assert torch.equal(one_by_one.bodies, at_once.bodies)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["track", "follow"])
 def test_episodes_on_islands_of_ice_are_those_of_the_compiled_batch(task):
     failures, ends, _ = assert_same_episodes(*both(task, 9, corridor=0.09, floor=ISLANDS), 100)
@@ -48,6 +49,7 @@ def test_episodes_among_obstacles_on_a_slippery_floor_are_those_of_the_compiled_
     assert impacts >= 1
 
 
+@pytest.mark.slow
 def test_single_precision_stays_within_a_millimetre():
     """Over 40 periods: 160 steps of 1.2e-7, spread by casters that swing freely."""
     theirs, ours = both("track", 8, dtype=torch.float32, corridor=5.0, max_episode_steps=1000, floor=ISLANDS)

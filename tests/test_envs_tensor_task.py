@@ -74,6 +74,7 @@ def gradient(compiled):
     return actions.grad
 
 
+@pytest.mark.slow
 def test_compiled_gradients_are_the_eager_ones():
     """1e-12 of order 1: the same products in another order; a gradient through a wrong buffer differs by 1e-4."""
     torch.testing.assert_close(gradient(True), gradient(False), rtol=0.0, atol=1e-12)

@@ -143,6 +143,7 @@ def test_the_robot_file_is_the_robot_with_its_payload_and_nothing_else_lost(foun
     assert robot.platform.footprint == original.platform.footprint
 
 
+@pytest.mark.slow
 def test_what_is_not_told_is_said_and_has_no_interval(short, tmp_path):
     still = short.with_name("still.csv")
     rows = short.read_text().splitlines()

@@ -14,6 +14,8 @@ from caster_gym.robot import load_robot
 from tests.random_robots import random_robot
 
 CHUNG = load_robot("chung2008")
+PAIR = CHUNG.model_copy(update={"casters": CHUNG.casters[:2]})  # for speed
+WINDOW = 0.5  # [s] half the usual length: half the time
 NOISE = Noise(position=1e-3, heading=2e-3, velocity=1e-2, yaw_rate=1e-2, steering=2e-3)
 LOAD = {"payload_mass": 1.0, "payload_x": 0.03, "payload_y": -0.02}
 FRICTION = {"roll_viscous": 3e-4, "roll_coulomb": 4e-3, "steer_viscous": 2e-4, "steer_coulomb": 2e-3, "scrub": 3e-4}
@@ -52,7 +54,7 @@ def loaded():
 def test_without_noise_the_truth_is_found(name, seed, starts, with_twist):
     robot, truth = load_robot(name), TRUTH[name]
     recording = record(robot_with(robot, truth), 4.0, 0.02, seed=seed)
-    found = identify(robot, recording if with_twist else recording.without_twist(), tuple(truth), starts)
+    found = identify(robot, recording if with_twist else recording.without_twist(), tuple(truth), starts, window=WINDOW)
     # the fit's steps are corrected to the finer ones of the recording to first order, and friction's law may be another
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-2)
     assert_allclose(found.estimates[[0, 1, 2, -1]], np.array(list(truth.values()))[[0, 1, 2, -1]], rtol=1e-4)
@@ -73,19 +75,20 @@ def test_a_recording_of_finer_time_steps_is_told_within_one_percent():
     states = Model(robot).simulate(first, held, 0.02 / finer, len(held))[::finer]
     assert len(states) == count
     recording = Recording(0.02, states[:, :3], states[:, 6:], coarse.torque, states[:, 3:6])
-    found = identify(CHUNG, recording, tuple(truth))
+    found = identify(CHUNG, recording, tuple(truth), window=WINDOW)
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-2)
 
 
 ZEROS = {"steering_zero_1": 0.014, "steering_zero_2": -0.02, "steering_zero_3": 0.008}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_rolling", [True, False])
 def test_radius_and_steering_zeros_are_found_without_noise(with_rolling):
     truth = {"radius": 0.0256, **ZEROS}
     recording = record(robot_with(CHUNG, {"radius": 0.0256}), 2.0, 0.02, seed=5, with_rolling=with_rolling)
     recording = replace(recording, steering=recording.steering + list(ZEROS.values()))
-    found = identify(CHUNG, recording, tuple(truth))
+    found = identify(CHUNG, recording, tuple(truth), window=WINDOW)
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-4, atol=1e-5)  # where the fit settles
     assert found.warnings == ()
     assert {caster.radius for caster in found.robot.casters} == {float(found.estimates[0])}
@@ -113,21 +116,23 @@ def test_straight_motion_by_hand_tells_mass_radius_and_zeros():
         np.tile(way[:, None] / radius, (1, 3)),
     )
     truth = {"payload_mass": load, "radius": radius, **ZEROS}
-    found = identify(CHUNG, recording, tuple(truth))
+    found = identify(CHUNG, recording, tuple(truth), window=WINDOW)
     assert found.untold == ()
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-4, atol=1e-5)  # where the fit settles
 
 
+@pytest.mark.slow
 def test_casters_of_different_sizes_keep_them_while_something_else_is_identified():
     robot = random_robot(3, 2)
     assert robot.casters[0].trail != robot.casters[1].trail
     mass = 0.2 * robot.platform.mass
     recording = record(robot_with(robot, {"payload_mass": mass}), 2.0, 0.02, seed=1)
-    found = identify(robot, recording, ("payload_mass",))
+    found = identify(robot, recording, ("payload_mass",), window=WINDOW)
     assert_allclose(found.estimates, mass, rtol=1e-6)
     assert found.robot.casters == robot.casters
 
 
+@pytest.mark.slow
 def test_what_is_hardly_told_apart_is_named_with_its_correlation():
     """Straight ahead a force moves masses; friction that is known parts torques from them, a little."""
     robot = robot_with(CHUNG, {"roll_viscous": 2e-4})
@@ -139,7 +144,7 @@ def test_what_is_hardly_told_apart_is_named_with_its_correlation():
     quiet = Noise(position=1e-6, heading=1e-6, velocity=1e-5, yaw_rate=1e-5, steering=1e-6)
     still = {"payload_mass": 0.1}
     found = identify(
-        robot, recording.noisy(quiet, np.random.default_rng(0)), ("payload_mass", "roll_strength"), still, window=0.5
+        robot, recording.noisy(quiet, np.random.default_rng(0)), ("payload_mass", "roll_strength"), still, window=WINDOW
     )
     correlation = found.correlations[0, 1]
     assert correlation > 0.98
@@ -151,12 +156,11 @@ def test_what_is_hardly_told_apart_is_named_with_its_correlation():
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """Of 50 intervals of 95 %, 42 or more hold the truth in all but one in 20,000 samples, were they independent."""
-    robot = CHUNG.model_copy(update={"casters": CHUNG.casters[:2]})  # for speed
     truth = {**LOAD, "trail": 0.0255, "roll_viscous": 2e-4}
-    recording = record(robot_with(robot, truth), 2.0, 0.02, seed=5)
+    recording = record(robot_with(PAIR, truth), 2.0, 0.02, seed=5)
     apart, alarms = [], 0
     for seed in range(10):
-        found = identify(robot, noisy(recording, seed), tuple(truth), window=0.5)
+        found = identify(PAIR, noisy(recording, seed), tuple(truth), window=0.25)
         apart.append((found.estimates - list(truth.values())) / found.half_widths)
         alarms += len(found.warnings)
     assert (np.abs(apart) <= 1.0).sum() >= 42
@@ -165,8 +169,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert alarms == 0
 
 
+@pytest.mark.slow
 def test_the_noise_is_found_in_each_kind_and_intervals_are_as_wide_as_was_asked(loaded):
-    found = identify(CHUNG, noisy(loaded, 1), tuple(LOAD), LOAD, confidence=0.9973)
+    found = identify(CHUNG, noisy(loaded, 1), tuple(LOAD), LOAD, window=WINDOW, confidence=0.9973)
     for one in found.agreements:
         truth = getattr(NOISE, one.kind)
         assert one.left == pytest.approx(truth, rel=0.2)  # of 100 samples or more: three standard deviations
@@ -175,11 +180,12 @@ def test_the_noise_is_found_in_each_kind_and_intervals_are_as_wide_as_was_asked(
     assert_allclose(found.half_widths, 3.0 * found.deviations, rtol=1e-3)  # the digits of 0.9973
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [None, NOISE])
 def test_a_model_that_does_not_explain_the_recording_is_warned_of(noise):
     recording = noisy(record(robot_with(CHUNG, LOAD), 2.5, 0.02, seed=3, dynamics="chung2008"), 0)
-    wrong = identify(CHUNG, recording, tuple(LOAD), noise=noise, window=0.5)
-    right = identify(CHUNG, recording, tuple(LOAD), noise=noise, window=0.5, dynamics="chung2008")
+    wrong = identify(CHUNG, recording, tuple(LOAD), noise=noise, window=WINDOW)
+    right = identify(CHUNG, recording, tuple(LOAD), noise=noise, window=WINDOW, dynamics="chung2008")
     assert any("does not explain the recording" in sentence for sentence in wrong.warnings)
     assert right.warnings == ()
     assert (wrong.half_widths > 2.0 * right.half_widths).all()
@@ -195,13 +201,14 @@ def still(count=60):
 @pytest.mark.parametrize("recording", [still(), noisy(still(), 0)], ids=["exact", "noisy"])
 def test_a_robot_that_stands_still_tells_nothing(recording):
     names = (*LOAD, "scrub")
-    found = identify(CHUNG, recording, names)
+    found = identify(CHUNG, recording, names, window=WINDOW)
     assert sorted(found.untold) == sorted(f"The recording does not determine {name}." for name in names)
     assert not found.is_told.any()
     assert_allclose(found.estimates, [one.start for one in found.unknowns], atol=1e-3)  # where they started
     assert found.warnings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_noise", [False, True])
 def test_straight_motion_tells_the_mass_and_how_far_aside_it_is_but_not_how_far_ahead(with_noise):
     """No yaw, no steering: the moment of the inertial force is all that the place changes, m a y."""
@@ -212,7 +219,7 @@ def test_straight_motion_tells_the_mass_and_how_far_aside_it_is_but_not_how_far_
     torque[:, 0] = torque[:, 2]  # as much on the left as on the right of C, where one caster stands on the axis
     states = Model(robot_with(CHUNG, truth)).simulate(np.zeros(9), np.repeat(torque[:-1], 2, axis=0), 0.01, 198)[::2]
     recording = Recording(0.02, states[:, :3], states[:, 6:], torque, states[:, 3:6])
-    found = identify(CHUNG, noisy(recording, 0) if with_noise else recording, (*truth, "scrub"))
+    found = identify(CHUNG, noisy(recording, 0) if with_noise else recording, (*truth, "scrub"), window=WINDOW)
     assert_array_equal(found.is_told, [True, False, True, False])
     assert set(found.untold) == {f"The recording does not determine {name}." for name in ("payload_x", "scrub")}
     reached = np.abs(found.estimates - [*truth.values(), 0.0])[[0, 2]]
@@ -238,9 +245,10 @@ def test_unknowns_that_only_show_together_are_named_together():
     assert not found.is_told.any()
 
 
+@pytest.mark.slow
 def test_a_bound_that_holds_an_unknown_is_told_and_no_interval_given(loaded):
     starts, bounds = {**LOAD, "payload_mass": 0.3}, {"payload_mass": (0.0, 0.5)}
-    found = identify(CHUNG, noisy(loaded, 0), ("payload_mass",), starts, bounds, window=0.5)
+    found = identify(CHUNG, noisy(loaded, 0), ("payload_mass",), starts, bounds, window=WINDOW)
     assert found.estimates[0] == 0.5
     assert np.isinf(found.half_widths[0])
     assert any("payload_mass went to its bound of 0.5 kg" in sentence for sentence in found.warnings)

@@ -53,6 +53,7 @@ def test_only_driven_joints_push_and_none_beyond_its_limit():
     assert (np.abs(torque[:, :4]).max(axis=0) == limits).all()  # with twice the force that there is, each reaches it
 
 
+@pytest.mark.slow
 def test_noise_has_the_size_that_was_asked_for_in_each_kind():
     recording = record(ROBOT, 10.0, 0.02, seed=0, with_rolling=True)
     sizes = {"position": 0.1, "heading": 0.2, "velocity": 0.3, "yaw_rate": 0.4, "steering": 0.5, "rolling": 0.6}

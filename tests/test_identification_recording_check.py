@@ -155,6 +155,7 @@ def test_a_robot_that_stands_still_contradicts_nothing(drives):
         assert check_recording(still.noisy(USUAL, np.random.default_rng(seed)), ROBOTS["chung2008"]) == ()
 
 
+@pytest.mark.slow
 def test_wrong_sizes_are_named_unless_they_are_asked_for_or_given(drives):
     truth = {"radius": 0.0265, "trail": 0.0235}
     robot = ROBOTS["chung2008"]

@@ -14,7 +14,9 @@ STEP = 1e-6  # of central differences: truncation of about 1e-12 times third der
 
 
 @pytest.mark.parametrize(
-    ("robot", "seconds"), [(random_robot(1, 2), 0.2), (load_robot("tidybot2"), 0.1)], ids=["random", "tidybot2"]
+    ("robot", "seconds"),
+    [(random_robot(1, 2), 0.2), pytest.param(load_robot("tidybot2"), 0.1, marks=pytest.mark.slow)],
+    ids=["random", "tidybot2"],
 )
 def test_the_derivatives_are_those_of_central_differences(robot, seconds):
     names = tuple(UNITS)

@@ -48,6 +48,7 @@ def test_a_disc_thrown_straight_at_a_wall_bounces_where_and_when_it_must(e, h):
     assert_allclose(walk.pressing, (1.0 + e) * mass * 2.0, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 10**6), outline=st.sampled_from([0.2, TRIANGLE]), mu=st.sampled_from([0.0, 0.3]))
 def test_a_step_with_an_impact_is_free_motion_the_impulse_and_free_motion(seed, outline, mu):
@@ -217,7 +218,7 @@ def test_a_robot_that_leans_against_a_wall_comes_to_rest(h, e):
     assert walk.impacts == impacts
 
 
-@pytest.mark.parametrize(("e", "mu"), [(0.3, 0.3), (0.7, 0.5)])
+@pytest.mark.parametrize(("e", "mu"), [(0.3, 0.3), pytest.param(0.7, 0.5, marks=pytest.mark.slow)])
 def test_a_robot_that_is_pushed_into_a_corner_comes_to_rest(e, mu):
     """Two walls whose friction loads each other: neither may be given more than both need together."""
     robot = load_robot("chung2008")
@@ -345,6 +346,7 @@ def test_far_obstacles_change_nothing():
     assert_array_equal(np.concatenate([np.ravel(p) for p in walk.state]), np.concatenate([np.ravel(p) for p in free]))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=6)
 @given(seed=st.integers(0, 10**6), outline=st.sampled_from([0.2, TRIANGLE]), e=st.sampled_from([0.0, 0.5, 1.0]))
 def test_a_coasting_robot_gains_no_energy(seed, outline, e):

@@ -147,7 +147,7 @@ def test_one_contact_is_struck_as_a_single_one_and_loses_the_energy_that_it_must
         assert_allclose(before_J - after_J, lost, rtol=0.0, atol=1e-12 * max(before_J, 1.0))
 
 
-@pytest.mark.parametrize("mu", [0.0, None])
+@pytest.mark.parametrize("mu", [0.0, pytest.param(None, marks=pytest.mark.slow)])
 def test_the_order_of_walls_does_not_matter(mu):
     """Flush sides, corners of all angles, three walls; smooth and rough."""
     for seed in SEEDS:
@@ -195,6 +195,7 @@ def mirrored(one):
     )
 
 
+@pytest.mark.slow
 def test_a_mirrored_scene_has_mirrored_impulses():
     for seed in SEEDS:
         one = scene(seed)

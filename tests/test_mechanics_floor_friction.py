@@ -173,6 +173,7 @@ def hard_problems(monkeypatch, h=5e-3):
     return met
 
 
+@pytest.mark.slow
 def test_two_rounds_suffice_for_robots_that_slip_in_every_way(monkeypatch):
     """What they leave in the second stage, which decides: distance of all slips from those of many rounds."""
     met = hard_problems(monkeypatch)[1::2]

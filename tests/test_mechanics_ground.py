@@ -117,7 +117,7 @@ def test_a_wheel_that_would_be_pulled_down_lifts_and_the_others_carry(caster_cou
     assert lifted > 3
 
 
-@pytest.mark.parametrize("caster_count", [3, 4, 6])
+@pytest.mark.parametrize("caster_count", [3, *(pytest.param(one, marks=pytest.mark.slow) for one in (4, 6))])
 def test_loads_of_a_moving_robot_turn_its_momentum(caster_count):
     """(G7): gravity, loads and push change the spin of all bodies about the floor; against Kane's bodies in space."""
     robot = random_robot(52, caster_count)
@@ -169,7 +169,7 @@ def test_traction_use_is_the_share_of_the_friction_cone():
     assert_allclose(traction_use((3.0, -4.0), 0.0, 0.1, 0.5), 100.0, rtol=1e-15)  # lifted
 
 
-@pytest.mark.parametrize("caster_count", [2, 3, 4, 5])
+@pytest.mark.parametrize("caster_count", [3, *(pytest.param(one, marks=pytest.mark.slow) for one in (2, 4, 5))])
 def test_floor_impulses_are_those_of_kanes_bodies(caster_count):
     """(G8): an impulse on a robot at rest is a push of one second whose acceleration has no time to become motion."""
     for seed in range(10):

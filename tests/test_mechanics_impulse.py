@@ -235,7 +235,7 @@ def integrated(v_n, v_t, nn, nt, tt, e, mu, steps=2000):
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("mu", [0.1, 0.5, 2.0, 5.0])
+@pytest.mark.parametrize("mu", [0.1, 0.5, *(pytest.param(one, marks=pytest.mark.slow) for one in (2.0, 5.0))])
 def test_stronges_law_is_the_integral_along_the_impulse(e, mu):
     """(C3), (C4), (C5), (C6): against thousands of small steps; contacts slide, stick, turn round and jam."""
     v_n, v_t, nn, nt, tt = contacts(300)

@@ -41,7 +41,7 @@ def energies(model, states):
     return model.kinetic_energy(states[..., 6:], states[..., 3:6])
 
 
-@pytest.mark.parametrize("caster_count", [2, 3])
+@pytest.mark.parametrize("caster_count", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_energy_is_kept_without_actuation_or_friction(caster_count):
     """Ten seconds of free motion; at a step of 2 ms the method itself loses some 1e-11."""
     model = Model(frictionless(random_robot(71, caster_count)))
@@ -51,6 +51,7 @@ def test_energy_is_kept_without_actuation_or_friction(caster_count):
     assert_allclose(energies(model, states), energies(model, state), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_energy_of_the_published_robot_is_kept():
     """Its trail of 25 mm turns casters within 25 ms at 1 m/s, so that a step of 2 ms loses a little more: 1e-9."""
     model = Model(load_robot("chung2008"))

@@ -147,8 +147,8 @@ def many_slides(robot, frictions, starts):
     return state, np.repeat(frictions, starts)
 
 
-@pytest.mark.parametrize("height", [0.0, 0.1, 0.3, 0.6])
-@pytest.mark.parametrize("name", [*ROBOTS, 3, 4, 5])
+@pytest.mark.parametrize("height", [0.3, *(pytest.param(one, marks=pytest.mark.slow) for one in (0.0, 0.1, 0.6))])
+@pytest.mark.parametrize("name", [3, *(pytest.param(one, marks=pytest.mark.slow) for one in (*ROBOTS, 4, 5))])
 def test_energy_never_rises_where_wheels_lift(name, height):
     """(S11): on floors from ice to glue, of robots as tall as they like."""
     robot = frictionless(random_robot(3, name) if isinstance(name, int) else load_robot(name))

@@ -48,7 +48,9 @@ def test_the_page_has_a_line_for_each_row_and_a_column_for_each_robot(monkeypatc
     assert 0.0 <= step_error(CHUNG) < 1.0  # µm
 
 
-@pytest.mark.parametrize("name", model_limits.ROBOTS)
+@pytest.mark.parametrize(
+    "name", ["chung2008", *(pytest.param(one, marks=pytest.mark.slow) for one in model_limits.ROBOTS[1:])]
+)
 def test_every_size_is_a_number(name, monkeypatch):
     monkeypatch.setattr(model_limits, "DRAWS", 20)
     monkeypatch.setattr(model_limits, "SECONDS", 0.1)

@@ -87,6 +87,7 @@ def test_wheel_holds_every_source_and_every_configuration(wheel):
     assert expected - names == set()
 
 
+@pytest.mark.slow
 def test_installed_wheel_works_without_the_checkout(installed, tmp_path):
     code = (
         "import importlib, json, caster_gym\n"
@@ -164,6 +165,7 @@ def test_dir_shows_the_public_names(installed, tmp_path):
     assert "__version__" in names
 
 
+@pytest.mark.slow
 def test_papers_run_in_a_clone_beside_the_installed_package(installed, tmp_path):
     """They are no part of the wheel, which holds one top-level package; nothing but their folder is needed."""
     shutil.copytree(ROOT / "papers", tmp_path / "papers", ignore=shutil.ignore_patterns("__pycache__"))

@@ -59,6 +59,7 @@ def test_the_timed_course_starts_and_ends_as_the_course_does():
     assert_allclose(timed.samples[-1, 7:], 0.0, atol=0.0)
 
 
+@pytest.mark.slow
 def test_random_paths_that_do_not_reverse_always_make_courses():
     courses = build_courses({**RANDOM, "count": 200, "seed": 7}, ROBOT, 1.0)
     assert len(courses) == 200 and len({course.name for course in courses}) == 200

@@ -129,7 +129,9 @@ def test_the_shortest_time_for_a_path_is_the_same_for_coarse_and_fine_samples(wh
     assert use_at(path, low / 1.002, 1000.0, robot) > 1.0
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    "name", ["chung2008", *(pytest.param(one, marks=pytest.mark.slow) for one in ("tidybot2", "xr4000"))]
+)
 def test_nothing_between_samples_is_harder_than_what_is_found(name):
     """Against samples that lie 100 times as close together."""
     robot = load_robot(name)
@@ -257,6 +259,7 @@ def test_friction_beyond_the_motors_cannot_be_helped_by_going_slower():
         build_trajectories("circle", stuck, 0.02)
 
 
+@pytest.mark.slow
 def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they_take():
     """A hundred times the duration would suffice, and nothing at all for what lies beyond a million time steps."""
     path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
@@ -277,6 +280,7 @@ def test_viscous_friction_falls_with_speed_and_the_slow_path_that_is_offered_is_
     assert build_trajectories({**path, "duration": duration}, sticky, 0.02)
 
 
+@pytest.mark.slow
 def test_a_path_that_would_take_too_many_time_steps_is_told_how_much_slower_it_must_be():
     far = {"shape": "circle", "radius": 1e4, "duration": 1000.0}
     with pytest.raises(ValueError, match=r"must be driven \S+ times as slowly, .* more time steps than") as error:

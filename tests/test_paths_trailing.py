@@ -32,7 +32,7 @@ def steering_along(samples, time_step, robot):
 
 
 @pytest.mark.parametrize("path", ["lemniscate", {"shape": "circle", "heading": "spinning"}])
-@pytest.mark.parametrize("name", ["chung2008", "tidybot2"])
+@pytest.mark.parametrize("name", ["chung2008", pytest.param("tidybot2", marks=pytest.mark.slow)])
 def test_casters_trail_as_the_steering_rates_of_the_model_say(path, name):
     """DOP853 on δ̇ of the model, the motion by quintics through a table of 1 ms, against the map at 20 ms and at 10 ms.
 

@@ -247,7 +247,7 @@ def track(env, actions, steps):
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("bandwidth", [2.0, 20.0, 1000.0])
+@pytest.mark.parametrize("bandwidth", [20.0, *(pytest.param(one, marks=pytest.mark.slow) for one in (2.0, 1000.0))])
 @pytest.mark.parametrize("frame", ["world", "body"])
 def test_a_turning_robot_goes_where_commands_point(robot, bandwidth, frame):
     """A direction of the world, given as such or turned into B before every action, at 2 rad/s to either side.
@@ -278,7 +278,12 @@ def test_constant_commands_in_the_body_stay_there(robot):
 
 
 @pytest.mark.parametrize(
-    ("robot", "speed", "rate"), [("chung2008", 1.0, 4.0), ("tidybot2", 1.5, 6.0), ("xr4000", 2.0, 6.0)]
+    ("robot", "speed", "rate"),
+    [
+        ("chung2008", 1.0, 4.0),
+        pytest.param("tidybot2", 1.5, 6.0, marks=pytest.mark.slow),
+        pytest.param("xr4000", 2.0, 6.0, marks=pytest.mark.slow),
+    ],
 )
 def test_a_twist_beyond_the_motors_is_reduced_as_one(robot, speed, rate):
     """It settles at a multiple of the command, to a few percent: hardly any torque is left to correct errors."""

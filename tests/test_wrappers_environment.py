@@ -112,7 +112,13 @@ def random_actions(space, seed):
         yield (size * kept).astype(np.float32)
 
 
-@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize(
+    "mode",
+    [
+        AutoresetMode.NEXT_STEP,
+        *(pytest.param(one, marks=pytest.mark.slow) for one in (AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)),
+    ],
+)
 @pytest.mark.parametrize(
     ("stack", "count", "steps"),
     [("torques", 3, 150), ("torques", 35, 45), *((name, 5, 90) for name in STACKS if name != "torques")],
