@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from caster_gym.agents.comparison.evaluation import Batch, bare
+from caster_gym.states import AnyState, State, check_state, join_states, part_of, read_seeds, seed_arrays, without
 
 
 class SB3VecEnv(VecEnv):
@@ -85,6 +86,25 @@ class SB3VecEnv(VecEnv):
         if len(ended):
             self._returns[done], self._errors[done], self._lengths[done] = 0.0, 0.0, 0
         return observations, rewards.astype(np.float32), done, each
+
+    def get_state(self) -> State:
+        """Copies of all that the batch goes on from between two steps, as a flat dictionary of arrays."""
+        sums = {"returns": self._returns.copy(), "errors": self._errors.copy(), "lengths": self._lengths.copy()}
+        return sums | join_states(seeds=seed_arrays(self._seeds), batch=self.batch.get_state())
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the batch did whose `get_state` gave the state: also in another process.
+
+        Raises ValueError, with nothing changed, for a state of a batch that was made in another way. `last_infos` is
+        empty until the next step.
+        """
+        self.batch.check_state(part_of(state, "batch"))
+        check_state("the batch for SB3", without(state, "batch"), without(self.get_state(), "batch"))
+        self.batch.set_state(part_of(state, "batch"))
+        self._returns[:], self._errors[:] = state["returns"], state["errors"]
+        self._lengths[:] = state["lengths"]
+        self._seeds = read_seeds(part_of(state, "seeds"))
+        self.last_infos = {}
 
     def close(self) -> None:
         """Release the batch."""

@@ -1,6 +1,7 @@
 """One robot on a path as a Gymnasium environment, whatever its task."""
 
 import copy
+from functools import cached_property
 from typing import Any, Self
 
 import gymnasium as gym
@@ -15,8 +16,21 @@ from caster_gym.envs.inputs import FLOAT32, checked_seed, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, TaskEngine
 from caster_gym.envs.report import named
 from caster_gym.envs.spaces import action_space, observation_space
-from caster_gym.envs.specification import plain_specification
+from caster_gym.envs.specification import describe_environment, plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
+from caster_gym.states import (
+    AnyState,
+    State,
+    check_description,
+    check_state,
+    generator_words,
+    join_states,
+    part_of,
+    read_seeds,
+    seed_arrays,
+    set_generator,
+    without,
+)
 
 Observation = NDArray[np.float32]
 _ONLY, _CHOSEN = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.bool_)
@@ -76,6 +90,41 @@ class CasterEnv(gym.Env[Observation, NDArray[np.float32]]):
         if self.render_mode == "human":
             self.render()
         return observation, reward, terminated, truncated, named(report, self._terms, self._slipping)
+
+    def get_state(self) -> State:
+        """Copies of all that the environment goes on from, as a flat dictionary of arrays; see `set_state`."""
+        own = {
+            "made_of": self._made_of,
+            "started": np.array(self._started),
+            "generator": generator_words(self.np_random),
+            "action_space": generator_words(self.action_space.np_random),
+        }
+        return own | join_states(seed=seed_arrays([self._np_random_seed]), engine=self.engine.get_state())
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless `set_state` would take the state; nothing is changed."""
+        check_description(state, self._made_of)
+        self.engine.check_state(part_of(state, "engine"))
+        expected = without(self.get_state(), "engine", "made_of")
+        check_state("the environment", without(state, "engine", "made_of"), expected)
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the environment did whose `get_state` gave the state: also in another process.
+
+        The arrays are copied. Raises ValueError, with the robot as it was, for a state of an environment that was made
+        in another way. Gymnasium's wrappers around this one are not part of it: `caster_gym.wrappers.wrap` sees to
+        those inside of it.
+        """
+        self.check_state(state)
+        self.engine.set_state(part_of(state, "engine"))
+        set_generator(self.np_random, state["generator"])
+        set_generator(self.action_space.np_random, state["action_space"])
+        (self._np_random_seed,) = read_seeds(part_of(state, "seed"))
+        self._started = bool(state["started"])
+
+    @cached_property
+    def _made_of(self) -> NDArray[np.uint8]:
+        return describe_environment(self.task, self.engine)
 
     def __copy__(self) -> Self:
         """As independent as a deep copy: two environments around one engine would move the same robot."""

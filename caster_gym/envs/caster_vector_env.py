@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -19,8 +19,22 @@ from caster_gym.envs.drawing import Renderer, checked_mode
 from caster_gym.envs.inputs import Seeds, checked_mask, checked_seeds, read_actions
 from caster_gym.envs.native.engine import DRAW_A_PATH, Outcome, TaskEngine
 from caster_gym.envs.spaces import action_space, observation_space
-from caster_gym.envs.specification import plain_specification
+from caster_gym.envs.specification import describe_environment, plain_specification
 from caster_gym.envs.starts import read_options, read_start, restart_at
+from caster_gym.states import (
+    AnyState,
+    State,
+    check_description,
+    check_state,
+    generator_words,
+    join_states,
+    make_generator,
+    part_of,
+    read_seeds,
+    seed_arrays,
+    set_generator,
+    without,
+)
 
 Observations = NDArray[np.float32]
 
@@ -135,6 +149,50 @@ class CasterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         if not self._started:
             raise RuntimeError("reset every robot before they are drawn")
         return self._renderer.show_batch()
+
+    def get_state(self) -> State:
+        """Copies of all that the batch goes on from, as a flat dictionary of arrays; see `set_state`."""
+        generators = np.zeros((self.num_envs, 6), dtype=np.uint64)
+        for robot, generator in self._generators.items():
+            generators[robot] = generator_words(generator)
+        own = {
+            "made_of": self._made_of,
+            "done": self._done.copy(),
+            "seeded": self._seeded.copy(),
+            "generators_asked_for": np.isin(np.arange(self.num_envs), list(self._generators)),
+            "generators": generators,
+            "action_space": generator_words(self.action_space.np_random),
+            "single_action_space": generator_words(self.single_action_space.np_random),
+        }
+        return own | join_states(seeds=seed_arrays(self._seeds), engine=self.engine.get_state())
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless `set_state` would take the state; nothing is changed."""
+        check_description(state, self._made_of)
+        self.engine.check_state(part_of(state, "engine"))
+        check_state("the batch", without(state, "engine", "made_of"), without(self.get_state(), "engine", "made_of"))
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the batch did from which `get_state` took the state: also in another process.
+
+        The arrays are copied. Raises ValueError, with all robots as they were, for a state of a batch that was made
+        in another way. Generators are those of robots and of the action spaces.
+        """
+        self.check_state(state)
+        self.engine.set_state(part_of(state, "engine"))
+        self._done, self._seeded = state["done"].copy(), state["seeded"].copy()
+        self._started = bool(self._seeded.all())
+        self._seeds = read_seeds(part_of(state, "seeds"))
+        self._generators = {
+            int(robot): make_generator(state["generators"][robot])
+            for robot in np.flatnonzero(state["generators_asked_for"])
+        }
+        set_generator(self.action_space.np_random, state["action_space"])
+        set_generator(self.single_action_space.np_random, state["single_action_space"])
+
+    @cached_property
+    def _made_of(self) -> NDArray[np.uint8]:
+        return describe_environment(self.task, self.engine, autoreset_mode=self.autoreset_mode.value)
 
     def __copy__(self) -> Self:
         """As independent as a deep copy: two batches around one engine would move the same robots."""

@@ -8,15 +8,25 @@ from typing import Any
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from caster_gym.envs.native.engine import TaskEngine
 from caster_gym.paths.timed import timed_path
 from caster_gym.paths.trajectory import Trajectory
+from caster_gym.states import describe
 
 
 def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
     """The specification with the objects among its keywords as mappings, lists, numbers and words."""
     return spec if spec is None else replace(spec, kwargs={name: plain(value) for name, value in spec.kwargs.items()})
+
+
+def describe_environment(task: BaseModel, engine: TaskEngine, **more: Any) -> NDArray[np.uint8]:
+    """What tells an environment from others whose state it could not go on from; more: facts beside task and robot."""
+    parameters = {"kind": type(task).__name__, **plain(task)}
+    facts = {"number of robots": engine.count, "task": parameters, "robot": plain(engine.robot), **more}
+    return describe(facts | {"fingerprint of paths": engine.plan_fingerprint})
 
 
 def plain(value: Any) -> Any:

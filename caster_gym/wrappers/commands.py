@@ -104,6 +104,8 @@ class JointSpeeds(Feature):
 
 
 class _Residual(Runtime):
+    constants = frozenset({"_agent"})
+
     def __init__(self, feature: ResidualTorque, place: Place) -> None:
         self._agent, self._share = feature.agent, feature.share
         self._seen = np.zeros((place.count, place.engine.layout.size), dtype=np.float32)

@@ -15,6 +15,18 @@ from numpy.typing import NDArray
 from caster_gym.arrays import Array, Flags
 from caster_gym.envs.inputs import read_actions
 from caster_gym.envs.specification import plain
+from caster_gym.states import (
+    AnyState,
+    State,
+    check_description,
+    check_state,
+    describe,
+    generator_words,
+    join_states,
+    part_of,
+    set_generator,
+    without,
+)
 from caster_gym.wrappers.feature import Actions, Feature, Observations
 from caster_gym.wrappers.plants import WheelErrors
 from caster_gym.wrappers.specification import read_features
@@ -62,6 +74,50 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         for number in numbers.values():
             reward += number
         return self._stack.observe(observation[None])[0], reward, terminated, truncated, info
+
+    def get_state(self) -> State:
+        """Copies of all that the environment goes on from, as a flat dictionary of arrays, with its features' memory.
+
+        Gymnasium's TimeLimit inside is part of it.
+        """
+        limits = [-1 if one._elapsed_steps is None else one._elapsed_steps for one in self._time_limits()]
+        own: State = {
+            "made_of": _describe(self.features),
+            "elapsed": np.array(limits, dtype=np.int64),
+            "action_space": generator_words(self.action_space.np_random),
+        }
+        return own | join_states(env=_bare(self.env).get_state(), features=self._stack.get_state())
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless `set_state` would take the state; nothing is changed."""
+        check_description(state, _describe(self.features))
+        _bare(self.env).check_state(part_of(state, "env"))
+        others = "made_of", "env", "features"
+        check_state("the environment", without(state, *others), without(self.get_state(), *others))
+        self._stack.check_state(part_of(state, "features"))
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the environment did whose `get_state` gave the state: also in another process.
+
+        Raises ValueError, with nothing changed, for a state of an environment that was made in another way.
+        """
+        self.check_state(state)
+        if state["env/started"]:
+            self.env.reset()  # Gymnasium's wrappers want to have seen one
+        _bare(self.env).set_state(part_of(state, "env"))
+        self._stack.set_state(part_of(state, "features"))
+        for limit, elapsed in zip(self._time_limits(), state["elapsed"].tolist(), strict=True):
+            limit._elapsed_steps = None if elapsed < 0 else elapsed
+        set_generator(self.action_space.np_random, state["action_space"])
+
+    def _time_limits(self) -> "list[TimeLimit[Any, Any]]":
+        """Those inside, from the outermost on."""
+        found, inside = [], self.env
+        while isinstance(inside, gym.Wrapper):
+            if isinstance(inside, TimeLimit):
+                found.append(inside)
+            inside = inside.env
+        return found
 
     def __copy__(self) -> Self:
         """As independent as a deep copy: both would move the same robot."""
@@ -116,6 +172,37 @@ class FeatureVectorEnv(AnyVectorWrapper):
         _tell(infos, np.where(fresh, 0.0, task_rewards), going_on, everyone)
         return self._shown.copy(), rewards, terminated, truncated, infos
 
+    def get_state(self) -> State:
+        """Copies of all that the batch goes on from, as a flat dictionary of arrays, with its features' memory."""
+        own = {
+            "made_of": _describe(self.features),
+            "ended": self._ended.copy(),
+            "shown": self._shown.copy(),
+            "action_space": generator_words(self.action_space.np_random),
+            "single_action_space": generator_words(self.single_action_space.np_random),
+        }
+        return own | join_states(env=_bare(self.env).get_state(), features=self._stack.get_state())
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless `set_state` would take the state; nothing is changed."""
+        check_description(state, _describe(self.features))
+        _bare(self.env).check_state(part_of(state, "env"))
+        others = "made_of", "env", "features"
+        check_state("the batch", without(state, *others), without(self.get_state(), *others))
+        self._stack.check_state(part_of(state, "features"))
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the batch did whose `get_state` gave the state: also in another process.
+
+        Raises ValueError, with nothing changed, for a state of a batch that was made in another way.
+        """
+        self.check_state(state)
+        _bare(self.env).set_state(part_of(state, "env"))
+        self._stack.set_state(part_of(state, "features"))
+        self._ended, self._shown = state["ended"].copy(), state["shown"].copy()
+        set_generator(self.action_space.np_random, state["action_space"])
+        set_generator(self.single_action_space.np_random, state["single_action_space"])
+
     def __copy__(self) -> Self:
         """As independent as a deep copy: both would move the same robots."""
         return copy.deepcopy(self)
@@ -156,6 +243,15 @@ def wrap(env: Env | Batch, *features: Feature) -> FeatureEnv | FeatureVectorEnv:
     if isinstance(env, gym.Env):
         return FeatureEnv(env, features)
     raise ValueError(f"only Gymnasium environments can have features, got {env!r}")
+
+
+def _bare(env: Any) -> Any:
+    """The environment of caster_gym inside."""
+    return env.unwrapped
+
+
+def _describe(features: Sequence[Feature]) -> NDArray[np.uint8]:
+    return describe({"features": [{"feature": type(one).__name__, **plain(one)} for one in features]})
 
 
 def _engine(env: Env | Batch) -> Any:

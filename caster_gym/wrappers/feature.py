@@ -15,6 +15,8 @@ from pydantic import AfterValidator
 
 from caster_gym.arrays import Array, Flags, Indices, Seeds
 from caster_gym.configuration import Frozen
+from caster_gym.states import AnyState, State
+from caster_gym.wrappers.memory import check_memory, read_memory, set_memory
 
 if TYPE_CHECKING:
     from caster_gym.envs.native.engine import TaskEngine
@@ -89,6 +91,9 @@ class Runtime:
     action_space: "Box[Any] | None" = None
     """Space of one robot's action, if it means something else than inside."""
 
+    constants: ClassVar[frozenset[str]] = frozenset()
+    """Attributes that never change, of other kinds than texts, frozen settings and functions: no state holds them."""
+
     def begin(self, robots: Indices, quantities: Quantities) -> None:
         """New episodes of some robots have begun; quantities are those after their reset."""
 
@@ -99,6 +104,26 @@ class Runtime:
     def observe(self, observations: Observations, robots: Robots) -> Observations:
         """Observations for the outside from those of the inside, of some robots. The given array stays as it is."""
         return observations
+
+    def get_state(self) -> State:
+        """Copies of all arrays, numbers and generators among the attributes, also in lists, tuples and dictionaries.
+
+        Raises TypeError for an attribute that may change and is none of these; such a feature overrides this and the
+        next two.
+        """
+        return read_memory(self._called, vars(self), self.constants)
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless the state is one of this feature."""
+        check_memory(self._called, vars(self), self.constants, state)
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on from what `get_state` gave."""
+        set_memory(vars(self), self.constants, state)
+
+    @property
+    def _called(self) -> str:
+        return f"the feature at work {type(self).__name__.strip('_')!r}"
 
 
 class RewardRuntime(Runtime, ABC):

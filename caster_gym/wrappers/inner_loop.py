@@ -9,6 +9,8 @@ from caster_gym.wrappers.feature import Observations, Place, Robots, Runtime
 class InnerLoop(Runtime):
     """What loops read of the observation, and the motors they drive."""
 
+    constants = frozenset({"_layout", "_model"})
+
     def __init__(self, place: Place, bandwidth: float) -> None:
         robot = place.engine.robot
         self._layout = place.engine.layout

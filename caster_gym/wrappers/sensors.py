@@ -102,7 +102,7 @@ class _SensorNoise(Runtime):
             [feature.position_bias] * 2 + [feature.heading_bias] + [feature.speed_bias] * 2 + [feature.yaw_rate_bias]
         )
         self._noisy, self._biased = np.flatnonzero(self._noise), np.flatnonzero(self._bias)
-        self._wrong = {int(i) for i in (*self._noisy, *self._biased)}
+        self._wrong = frozenset(int(i) for i in (*self._noisy, *self._biased))
         self._constant = np.zeros((place.count, len(self._noise)))
         self._directions = place.part("directions").place.start + 2 * np.arange(casters)
         self._scales = {part.name: part.scale for part in layout.parts}

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from caster_gym.arrays import Array, Flags, Indices
+from caster_gym.arrays import Array, Flags, Indices, Seeds
 from caster_gym.configuration import ConfigurationError, did_you_mean
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
+from caster_gym.states import AnyState, State, check_state, join_states, part_of, without
 from caster_gym.wrappers.draws import seeds_of, stream
 from caster_gym.wrappers.feature import (
     Actions,
@@ -51,6 +52,7 @@ class Stack:
         self._coming = np.zeros((len(features), engine.count), dtype=np.uint64)  # of episodes that were started
         self._streams = [stream(place, getattr(feature, "kind", "")) for place, feature in enumerate(features)]
         self._runtimes = [self._started(i, feature) for i, feature in enumerate(features)]
+        self._names = [f"{i}_{getattr(one, 'kind', type(one).__name__)}" for i, one in enumerate(features)]
         self._rewards = [one for one in self._runtimes if isinstance(one, RewardRuntime)]
         self._plants = [(i, one) for i, one in enumerate(self._runtimes) if isinstance(one, PlantRuntime)]
         self._pushes = [one for one in self._runtimes if isinstance(one, PushingRuntime)]
@@ -124,6 +126,35 @@ class Stack:
         for runtime in self._runtimes:
             observations = runtime.observe(observations, robots)
         return observations
+
+    def get_state(self) -> State:
+        """Copies of all that the features remember."""
+        own = {"clocks": self._clocks.copy(), "seeds": self._own_seeds(), "coming": self._coming.copy()}
+        return own | join_states(**{name: one.get_state() for name, one in self._named().items()})
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless the state is one of these features in this order."""
+        named = self._named()
+        own = {"clocks": self._clocks, "seeds": self._own_seeds(), "coming": self._coming}
+        check_state("the features", without(state, *named), own)
+        for name, runtime in named.items():
+            runtime.check_state(part_of(state, name))
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on from a state that `get_state` gave and `check_state` has seen."""
+        self._clocks[:], self._coming[:] = state["clocks"], state["coming"]
+        for seeds, saved in zip(self._seeds, state["seeds"], strict=True):
+            seeds[:] = saved
+        for name, runtime in self._named().items():
+            runtime.set_state(part_of(state, name))
+
+    def _own_seeds(self) -> Seeds:
+        """Seeds (features, robots)."""
+        return np.array(self._seeds, dtype=np.uint64).reshape(self._coming.shape)
+
+    def _named(self) -> dict[str, Runtime]:
+        """Features at work by place and kind, as "0_payload"."""
+        return dict(zip(self._names, self._runtimes, strict=True))
 
     @property
     def terms(self) -> tuple[str, ...]:

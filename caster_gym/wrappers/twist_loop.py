@@ -47,6 +47,8 @@ class Settings(Protocol):
 class TwistLoop(InnerLoop):
     """Torques for twist commands."""
 
+    constants = InnerLoop.constants | {"_engine"}
+
     def __init__(self, settings: Settings, place: Place) -> None:
         super().__init__(place, settings.bandwidth)
         self._engine, self._period = place.engine, place.period

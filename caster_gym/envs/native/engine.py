@@ -17,6 +17,7 @@ from caster_gym.envs.plan import Beside, Span
 from caster_gym.envs.report import RESULT, named
 from caster_gym.envs.scene import Scene, draw_scene
 from caster_gym.mechanics.separation import Obstacles
+from caster_gym.states import AnyState
 
 DRAW_A_PATH = -1
 _ENDED = rows.span((RESULT.failed, RESULT.late))
@@ -185,6 +186,13 @@ class TaskEngine(Robots):
             self._pace.floor,
             self._pace.time_step,
         )
+
+    def set_state(self, state: AnyState) -> None:
+        """See `Robots`. Where robots are drawn and those of the state were not, they report what they see now."""
+        drawn = self._kept_reports is not None
+        super().set_state(state)
+        if drawn:
+            self.keep_reports()
 
     def keep_reports(self) -> None:
         """Keep a copy of every report from now on, which pictures of a batch need."""

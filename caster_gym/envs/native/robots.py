@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +22,7 @@ from caster_gym.floor import Floor
 from caster_gym.mechanics.floor import FloorTable, PatchRow, floor_table
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.robot import Robot
+from caster_gym.states import AnyState, State, check_state, fingerprint
 
 
 class Robots:
@@ -120,6 +122,52 @@ class Robots:
     @changing.setter
     def changing(self, parts: tuple[NDArray[Any], ...]) -> None:
         self._build(*(np.array(part) for part in parts))
+
+    def get_state(self) -> State:
+        """Copies of all that changes from step to step, by name; what there is not at the moment is an empty array."""
+        blocks, parameters, clocks, seeds = self.changing
+        return {
+            "blocks": blocks,
+            "parameters": parameters if len(parameters) == block_count(self.count) else parameters[:0],
+            "clocks": clocks,
+            "seeds": seeds,
+            "late": np.zeros(0, dtype=np.int64) if self._late is None else self._late.copy(),
+            "reports": np.zeros((self.report_rows, 0)) if self._kept_reports is None else self._kept_reports.copy(),
+        }
+
+    def check_state(self, state: AnyState) -> None:
+        """Raise ValueError unless a state is one of so many robots of this kind on these paths."""
+        world = self._world
+        expected = {
+            "blocks": world.blocks,
+            "parameters": np.broadcast_to(0.0, (block_count(self.count), world.parameters.shape[1])),
+            "clocks": world.clocks,
+            "seeds": world.seeds,
+            "late": np.broadcast_to(np.int64(0), self.count),
+            "reports": np.broadcast_to(0.0, (self.report_rows, self.count)),
+        }
+        check_state("the robots", state, expected, ("parameters", "late", "reports"))
+        clocks, paths = state["clocks"]
+        if clocks.min() < 0 or paths.min() < 0 or paths.max() >= len(self.plan.names):
+            raise ValueError(
+                f"'clocks' in the state of the robots must hold control periods of 0 or more and paths in "
+                f"0 … {len(self.plan.names) - 1}, got {clocks.min()} … {clocks.max()} and {paths.min()} … {paths.max()}"
+            )
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on from a state that `get_state` gave and `check_state` has seen. Arrays are copied."""
+        nominal = np.zeros((1, self._world.parameters.shape[1]))
+        to_lanes(np.array([pack_parameters(robot_parameters(self.robot))]), nominal, 0)
+        parameters = state["parameters"] if state["parameters"].size else nominal
+        self.changing = state["blocks"], parameters, state["clocks"], state["seeds"]
+        self._late = state["late"].copy() if state["late"].size else None
+        drawn = self._kept_reports is not None and state["reports"].size
+        self._kept_reports = state["reports"].copy() if drawn else None
+
+    @cached_property
+    def plan_fingerprint(self) -> str:
+        """What tells the paths, obstacles and reward weights of the plan from others."""
+        return fingerprint(self.plan)
 
     def seed(self, robot: int, key: int) -> None:
         """Begin a robot's sequence of episodes anew from a key."""
