@@ -1,7 +1,4 @@
-"""YAML files checked against typed models: an unknown key, a wrong value or a typo is an error that says where.
-
-PyYAML reads `3e-4` and `1e6` as strings; here they are numbers, as everywhere else.
-"""
+"""YAML files checked against typed models: an unknown key, a wrong value or a typo is an error that says where."""
 
 import difflib
 import re
@@ -9,20 +6,38 @@ import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, TypeVar, Union, get_args, get_origin
 
-import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from numpy.linalg import LinAlgError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.functional_validators import ModelWrapValidatorHandler
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from caster_gym.bounded_files import YAML_BYTES, read_bytes
 from caster_gym.file_names import FOLDER
+from caster_gym.plain_yaml import YamlError, read_plain_yaml
 
+_SURVEYED = 200  # problems that are looked at
 LONGEST_VALUE = 80  # characters of a value in a message
+MOST_PROBLEMS = 8  # in a message
+SMALLEST, GREATEST = 1e-12, 1e15  # of numbers in SI units: farther out, products of some of them lose their sense
+
+
+def _not_tiny(value: float) -> float:
+    if value < SMALLEST:
+        raise ValueError(f"must be at least {SMALLEST:g}, got {value:g}: nothing can be computed with less")
+    return value
+
+
+Positive: TypeAlias = Annotated[float, Field(gt=0.0), AfterValidator(_not_tiny)]
+"""A positive number that can be computed with."""
 
 
 class Frozen(BaseModel):
-    """Parameters that are checked once and never change. Words and yes/no are not taken for numbers."""
+    """Parameters that are checked once and never change.
+
+    Words and yes/no are not taken for numbers, and numbers beyond GREATEST are refused.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -31,7 +46,7 @@ class Frozen(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _nothing_is_taken_for_a_number(cls, content: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+    def _numbers_are_numbers(cls, content: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
         model = read(content)
         if isinstance(content, Mapping):
             problems = [
@@ -58,41 +73,19 @@ class ConfigurationError(ValueError):
 Model = TypeVar("Model", bound=BaseModel)
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader for which exponents make numbers and a key may stand only once."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            if key_node.tag == "tag:yaml.org,2002:merge":
-                continue
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise yaml.MarkedYAMLError(problem=f"the key {key!r} stands twice", problem_mark=key_node.start_mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$"),
-    list("-+.0123456789"),
-)
-
-
 def is_yaml(path: str | Path) -> bool:
     """Whether a name is that of a YAML file, by its suffix."""
     return Path(path).suffix.lower() in (".yaml", ".yml")
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Content of a YAML file that holds a mapping."""
+    """Content of a YAML file that holds a mapping. Raises ConfigurationError, whatever the file holds."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ConfigurationError(f"there is no file {str(path)!r}") from None
-    except (UnicodeDecodeError, OSError) as error:
+        text = read_bytes(path, YAML_BYTES).decode("utf-8")
+    except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path} cannot be read as YAML: {error}") from error
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from error
     content = parse_yaml(text, str(path))
     if not isinstance(content, dict):
         kind = {"NoneType": "nothing", "list": "a list", "str": "words"}.get(type(content).__name__, repr(content))
@@ -103,12 +96,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def parse_yaml(text: str, source: str) -> Any:
     """Value of a YAML text from a source that errors name."""
     try:
-        return yaml.load(text, Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        raise ConfigurationError(f"{source} cannot be read as YAML: {error.problem}{place}") from error
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        return read_plain_yaml(text)
+    except YamlError as error:
         raise ConfigurationError(f"{source} cannot be read as YAML: {error}") from error
 
 
@@ -121,11 +110,14 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str, folder: P
         return model.model_validate(content, context={FOLDER: folder})
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {describe(error, model)}") from error
+    except (ArithmeticError, LinAlgError) as error:  # of checks that compute
+        raise ConfigurationError(f"{source}: nothing can be computed with its numbers: {error}") from error
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """What is wrong, key by key, in sentences. Items of lists count from 1, as joints do."""
-    problems = error.errors()
+    problems = error.errors(include_url=False)
+    many, problems = len(problems) - _SURVEYED, problems[:_SURVEYED]
     deeper = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
     wrong = {problem["loc"][:-2] for problem in problems if problem["type"] != "missing"}
     complaints: dict[tuple[str, str], list[str]] = {}  # by place and value: each member of a union has its own
@@ -140,7 +132,14 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     places: dict[str, list[str]] = {}  # by what is wrong there, which is told once
     for (place, value), (first, *others) in complaints.items():
         places.setdefault(" or ".join([first, *(other.lstrip(": ") for other in others)]) + value, []).append(place)
-    return "; ".join(", ".join(where) + wrong for wrong, where in places.items())
+    sentences = [f"{_listed(where)}{wrong}" for wrong, where in places.items()]
+    more = max(len(sentences) - MOST_PROBLEMS, 0) + max(many, 0)
+    return "; ".join([*sentences[:MOST_PROBLEMS], *([f"and {more} more problems"] if more > 0 else [])])
+
+
+def _listed(places: list[str]) -> str:
+    more = len(places) - MOST_PROBLEMS
+    return ", ".join(places[:MOST_PROBLEMS]) + (f" and {more} more" if more > 0 else "")
 
 
 def did_you_mean(name: object, known: Iterable[str], usual: Mapping[str, str] = MappingProxyType({})) -> str:
@@ -174,6 +173,8 @@ def _misread(given: Any, read: Any) -> Iterator[tuple[tuple[int | str, ...], Any
     truth = isinstance(read, bool)
     if isinstance(read, int | float) and (isinstance(given, str) or isinstance(given, bool) != truth):
         yield (), given, "true or false" if truth else "a number"
+    elif isinstance(read, float) and abs(read) > GREATEST:
+        yield (), given, f"a number up to {GREATEST:g}"
 
 
 def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str]:

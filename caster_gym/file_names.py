@@ -11,12 +11,14 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, ValidationInfo
 
+from caster_gym.bounded_files import expanded
+
 FOLDER = "folder"  # key of the validation context
 
 
 def beside_its_file(name: str | Path, info: ValidationInfo) -> Path:
     """The file of that name, in the folder of the YAML file that names it if the name is relative."""
-    path = Path(name).expanduser()
+    path = expanded(name)
     folder = (info.context or {}).get(FOLDER)
     return path if folder is None else Path(folder).absolute() / path
 
@@ -44,7 +46,7 @@ def from_working_folder(value: Any) -> Any:
         return {key: from_working_folder(one) for key, one in value.items()}
     if isinstance(value, list):
         return [from_working_folder(one) for one in value]
-    return str(Path(value).expanduser().absolute()) if isinstance(value, str) and is_file_name(value) else value
+    return str(expanded(value).absolute()) if isinstance(value, str) and is_file_name(value) else value
 
 
 def _file(name: str, info: ValidationInfo) -> str:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
-from caster_gym.configuration import ConfigurationError, Frozen, parse
+from caster_gym.configuration import ConfigurationError, Frozen, Positive, parse
 
 GREATEST = 1e3  # [-] far above any floor; wheels then roll as if they could not slip, as long as none lifts
 
@@ -25,7 +25,7 @@ class Patch(Frozen):
     friction: Friction  # [-] between it and a wheel whose contact point lies on it
     x: float  # [m] its centre
     y: float
-    radius: PositiveFloat  # [m]
+    radius: Positive  # [m]
 
 
 class Floor(Frozen):
@@ -47,7 +47,7 @@ class Floor(Frozen):
         "ice": "patches",
     }
     friction: Friction | None = None  # [-] else the robot's own `floor_friction`
-    contact_time: PositiveFloat = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
+    contact_time: Positive = 0.01  # [s] of an impact, in which the floor holds wheels by friction · load · time
     patches: tuple[Patch, ...] = ()  # where they overlap, the last one counts
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
+from pydantic import Field, NonNegativeFloat, field_validator, model_validator
 
 from caster_gym.arrays import Array
-from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
+from caster_gym.bounded_files import expanded
+from caster_gym.configuration import ConfigurationError, Frozen, Positive, is_yaml, parse, read_yaml
 from caster_gym.floor import GREATEST
 from caster_gym.outlines import Corners, Outline, convex, polygon_fault
 from caster_gym.plausibility import warn_if_implausible
@@ -19,8 +20,8 @@ from caster_gym.shipped_files import find, names_of, own_file
 class Motor(Frozen):
     """The motor of one joint, seen at that joint."""
 
-    max_torque: PositiveFloat  # [N m]
-    max_speed: PositiveFloat  # [rad/s] at which no torque is left
+    max_torque: Positive  # [N m]
+    max_speed: Positive  # [rad/s] at which no torque is left
     rotor: NonNegativeFloat = 0.0  # [kg m²] inertia of what turns with the motor, at the motor's side of `gear`
     armature: NonNegativeFloat = 0.0  # [kg m²] inertia of gears that turn with the joint alone, referred to it
     viscous: NonNegativeFloat = 0.0  # [N m s/rad]
@@ -48,9 +49,9 @@ class Caster(Frozen):
 
     x: float  # [m] pivot, forward of C
     y: float  # [m] pivot, left of C
-    trail: PositiveFloat  # [m] steering axis to wheel centre, opposite to the rolling direction
+    trail: Positive  # [m] steering axis to wheel centre, opposite to the rolling direction
     offset: float = 0.0  # [m] wheel centre left of the steering axis
-    radius: PositiveFloat  # [m]
+    radius: Positive  # [m]
     wheel: Wheel
     link: Link
     roll: Motor
@@ -97,7 +98,7 @@ class Caster(Frozen):
 class Footprint(Frozen):
     """Outline of the platform in B: a disc of a radius around C, or a convex polygon."""
 
-    disc: PositiveFloat | None = None  # [m]
+    disc: Positive | None = None  # [m]
     polygon: Annotated[tuple[tuple[float, float], ...], Field(min_length=3)] | None = None  # [m] counter-clockwise
 
     @field_validator("polygon")
@@ -139,8 +140,8 @@ class Platform(Frozen):
         "center_of_mass": "com",
     }
 
-    mass: PositiveFloat  # [kg]
-    inertia: PositiveFloat  # [kg m²] about a vertical axis through its mass centre
+    mass: Positive  # [kg]
+    inertia: Positive  # [kg m²] about a vertical axis through its mass centre
     com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
     height: NonNegativeFloat = 0.0  # [m] of the mass centre above the floor; 0 leaves loads on wheels as at rest
     footprint: Footprint
@@ -169,7 +170,7 @@ class Robot(Frozen):
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
     # [-] between wheels and floor; tells how much of it is used
     floor_friction: Annotated[float, Field(gt=0.0, le=GREATEST)] = 0.7
-    coulomb_speed: PositiveFloat = 0.1  # [rad/s] rate of a joint below which its dry friction fades to zero
+    coulomb_speed: Positive = 0.1  # [rad/s] rate of a joint below which its dry friction fades to zero
 
     @field_validator("actuation", mode="before")
     @classmethod
@@ -298,7 +299,7 @@ def load_robot(name: str | Path | Robot | Mapping[str, Any]) -> Robot:
         raise ConfigurationError(
             f"a robot is a name, the path of a YAML file, a mapping with its content, or a Robot, got {name!r}"
         )
-    path = Path(name).expanduser()
+    path = expanded(name)
     if not is_yaml(path) and str(name) not in names_of("robots"):
         own = own_file(str(name))
         known = f"known are {', '.join(names_of('robots'))}, or give the path of a YAML file"

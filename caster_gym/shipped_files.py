@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
+from caster_gym.bounded_files import expanded
 from caster_gym.configuration import ConfigurationError, is_yaml, parse, read_yaml
 
 Settings = TypeVar("Settings", bound=BaseModel)
@@ -23,7 +24,7 @@ def _folder_of(kind: str) -> Path:
 def find(kind: str, name: str | Path) -> Path:
     """The file of a task, agent, design or benchmark: one that comes with the package, by its name, or a path."""
     if is_yaml(name):
-        path = Path(name).expanduser()
+        path = expanded(name)
         if not path.exists() and path.stem in names_of(kind):
             raise ConfigurationError(
                 f"there is no file {str(name)!r}; what comes with the package is called {path.stem!r}"

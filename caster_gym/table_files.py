@@ -9,6 +9,7 @@ import csv
 import re
 from pathlib import Path
 
+from caster_gym.bounded_files import TABLE_BYTES, read_bytes
 from caster_gym.tables import DECIMAL_COMMA, Column, Table, refuse_decimal_comma
 from caster_gym.units import is_unit
 
@@ -48,12 +49,7 @@ def read_table(path: Path) -> Table:
 
 def read_text(path: Path) -> str:
     """Text of a file, in UTF-8, UTF-16 with a byte-order mark, or the one-byte encoding of Western spreadsheets."""
-    try:
-        content = path.expanduser().read_bytes()
-    except FileNotFoundError:
-        raise ValueError(f"there is no file {str(path)!r}") from None
-    except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror or error}") from error
+    content = read_bytes(path, TABLE_BYTES, "; keep every tenth row, or a part of it")
     marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
     try:
         text = content.decode(marks.get(content[:2], "utf-8-sig"))

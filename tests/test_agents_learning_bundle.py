@@ -210,8 +210,8 @@ def test_an_unknown_key_is_named(tmp_path):
     [
         (lambda w: w.pop("head.bias"), r"weight 'head\.bias' is missing"),
         (lambda w: w.update(extra=torch.zeros(1)), "weight 'extra' is not known"),
-        (lambda w: w.update({"head.bias": torch.zeros(5)}), r"weight 'head\.bias' must be \(6,\) .*got \(5,\)"),
-        (lambda w: w.update({"head.bias": torch.zeros(6, dtype=torch.float64)}), "float32, got .*float64"),
+        (lambda w: w.update({"head.bias": torch.zeros(5)}), r"weight 'head\.bias' must be \[6\] .*got \[5\]"),
+        (lambda w: w.update({"head.bias": torch.zeros(6, dtype=torch.float64)}), "'F32', got .*'F64'"),
         (lambda w: w["layers.0.weight"].fill_(float("nan")), r"weight 'layers\.0\.weight' holds numbers that are not"),
         (lambda w: w["head.bias"].fill_(float("inf")), r"weight 'head\.bias' holds numbers that are not finite"),
     ],
@@ -227,7 +227,7 @@ def test_weights_that_do_not_fit_are_named(tmp_path, change, message):
 def test_layers_that_do_not_fit_the_weights_are_refused(tmp_path):
     folder = saved(tmp_path)
     change_description(folder, hidden=[16, 9])
-    with pytest.raises(ConfigurationError, match=r"weight 'head\.weight' must be \(6, 9\)"):
+    with pytest.raises(ConfigurationError, match=r"weight 'layers\.1\.weight' must be \[9, 16\]"):
         load_policy(folder)
 
 

@@ -1,5 +1,6 @@
 """YAML files and typed models: numbers are numbers, a key stands once, an error says what, where and what instead."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -7,7 +8,7 @@ import pytest
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from caster_gym import load_robot
-from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, parse_yaml, read_yaml
+from caster_gym.configuration import ConfigurationError, Frozen, Positive, is_yaml, parse, parse_yaml, read_yaml
 
 
 class Gain(Frozen):
@@ -271,7 +272,7 @@ def test_an_alias_bomb_is_refused_in_a_short_sentence(tmp_path):
     assert len(str(error.value)) < 5000
 
 
-@pytest.mark.parametrize("text", ["? [a]\n: 1", "[" * 3000, "x: !!float abc", "x: 2020-99-99"])
+@pytest.mark.parametrize("text", ["? [a]\n: 1", "[" * 3000, "x: !!float abc", "x: !!timestamp 2020-99-99"])
 def test_whatever_yaml_cannot_read_is_told_with_its_source(text):
     with pytest.raises(ConfigurationError, match="the source cannot be read as YAML"):
         parse_yaml(text, "the source")
@@ -282,3 +283,43 @@ def test_whatever_yaml_cannot_read_is_told_with_its_source(text):
 )
 def test_yaml_files_are_known_by_their_suffix_in_any_case(name, yes):
     assert is_yaml(name) is yes
+
+
+@pytest.mark.parametrize("number", [1e308, -1e16, 10**20])
+def test_numbers_that_nothing_can_be_computed_with_are_refused(number):
+    """Their squares and cubes are infinite."""
+    assert complaint(grid=[[1.0]], weights={"a": number}) == f"'weights.a' should be a number up to 1e+15, got {number}"
+    World.model_validate({"weights": {"a": 1e15, "b": -1e15, "c": 1e-300}})
+
+
+def test_positive_numbers_are_not_so_small_that_nothing_can_be_computed_with_them():
+    class Disc(Frozen):
+        radius: Positive
+
+    assert Disc(radius=1e-12).radius == 1e-12
+    with pytest.raises(ValidationError, match=r"must be at least 1e-12, got 1e-302"):
+        Disc(radius=1e-302)
+    with pytest.raises(ValidationError, match="greater than 0"):
+        Disc(radius=-1.0)
+
+
+def test_checks_that_cannot_compute_say_so():
+    class Ratio(Frozen):
+        over: float
+
+        @model_validator(mode="after")
+        def _is_small(self) -> Self:
+            assert 1.0 / self.over < 1e9
+            return self
+
+    with pytest.raises(ConfigurationError, match=r"^a: nothing can be computed with its numbers: .*division by zero"):
+        parse(Ratio, {"over": 0.0}, "a")
+
+
+def test_of_many_problems_the_first_are_told_and_the_rest_counted():
+    told = complaint(**{f"key_{i:04}": 1 for i in range(1000)})
+    assert told.startswith("unknown key 'key_0000', ")
+    assert re.search(r"'key_0007' and 192 more; known are .*; and 800 more problems$", told)
+    told = complaint(things=[{"kind": "pillar", "radius": -1.0}] * 50)
+    assert "greater than 0" in told
+    assert "and 42 more" in told

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import Field, PositiveFloat, PositiveInt, field_validator
+from pydantic import Field, PositiveInt, field_validator
 
 from caster_gym.agents.comparison import results
 from caster_gym.agents.comparison.evaluation import bare, evaluation_batch
@@ -18,7 +18,7 @@ from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
-from caster_gym.configuration import ConfigurationError, Frozen
+from caster_gym.configuration import ConfigurationError, Frozen, Positive
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.file_names import NameOrFile
 from caster_gym.report.provenance import write_provenance
@@ -46,7 +46,7 @@ class BenchmarkSettings(Frozen):
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
     starts: PositiveInt = 1  # episodes on each test path, with different starts
     start_seed: Seed = 1000  # the same starts for every agent
-    settling: PositiveFloat | None = None  # [s] what comes before counts as transient; None: as suits the task
+    settling: Positive | None = None  # [s] what comes before counts as transient; None: as suits the task
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
 
     @field_validator("seeds")

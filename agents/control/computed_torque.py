@@ -12,11 +12,12 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from caster_gym.agents.control.protocol import ControllerSettings
 from caster_gym.analysis.actuation import warn_if_singular
 from caster_gym.arrays import Array
+from caster_gym.configuration import Positive
 from caster_gym.control.torque_distribution import distribute
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
@@ -145,7 +146,7 @@ class ComputedTorqueSettings(ControllerSettings):
     }
     algorithm: Literal["computed torque"]
     known: KnownModel = "exact"
-    natural_frequencies: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
+    natural_frequencies: Annotated[tuple[Positive, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
 
     def controller(self, layout: ObservationLayout, period: float) -> ComputedTorque:
         """The controller with the first natural frequency."""

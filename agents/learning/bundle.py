@@ -4,20 +4,21 @@ policy.yaml            what the policy is, for which robot and task, and how it 
 weights.safetensors    the actor's weights
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
 import yaml
 from numpy.typing import NDArray
-from pydantic import PositiveInt, SerializeAsAny
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save
+from pydantic import Field, PositiveInt, SerializeAsAny
+from safetensors.torch import save
 
 from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
+from caster_gym.agents.learning.settings import MOST_LAYERS
+from caster_gym.agents.learning.weights import actor_shapes, read_weights
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.durable_files import replace_folder, scratch_folder, write_file
 from caster_gym.envs.observation import ObservationLayout
@@ -39,7 +40,7 @@ class PolicyDescription(ChosenTask):
     format: Literal[1]
     name: str
     squash: Squash
-    hidden: tuple[PositiveInt, ...]
+    hidden: Annotated[tuple[PositiveInt, ...], Field(max_length=MOST_LAYERS)]
     robot: Robot
     task: SerializeAsAny[TaskParameters]
     wrappers: tuple[FeatureSpecification, ...] = ()  # features of the environment that it acts in
@@ -166,8 +167,11 @@ def load_policy(folder: str | Path) -> Bundle:
     refuse_imports(content.get("environment"), str(folder / DESCRIPTION))
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
     actions = description.actions or len(description.robot.driven)
-    actor = Actor(description.layout.size, description.hidden, actions, description.squash)
-    _fill(actor, _read_weights(folder / WEIGHTS), folder / WEIGHTS)
+    sizes = description.layout.size, description.hidden, actions
+    weights = read_weights(folder / WEIGHTS, actor_shapes(*sizes))
+    with torch.device("meta"):  # nothing is allocated, and nothing drawn at random
+        actor = Actor(*sizes, description.squash)
+    actor.load_state_dict(weights, assign=True)
     return Bundle(description, actor)
 
 
@@ -190,28 +194,3 @@ def _no_policy(folder: Path) -> str:
         )
         return f"{folder} is no policy itself, but has policies in it: give {some}"
     return f"there is no policy in {folder}: it has no {DESCRIPTION}, as folders have that `caster-gym train` writes"
-
-
-def _read_weights(path: Path) -> dict[str, torch.Tensor]:
-    try:
-        return load_file(path)
-    except FileNotFoundError:
-        raise ConfigurationError(f"there is no file {str(path)!r}") from None
-    except (SafetensorError, OSError) as error:
-        raise ConfigurationError(f"{path} holds no weights: {error}") from error
-
-
-def _fill(actor: Actor, weights: Mapping[str, torch.Tensor], path: Path) -> None:
-    """Give an actor weights of the right names, shapes and type."""
-    wanted = actor.state_dict()
-    for name in sorted(wanted.keys() ^ weights.keys()):
-        raise ConfigurationError(f"{path}: weight {name!r} is {'missing' if name in wanted else 'not known'}")
-    for name, tensor in weights.items():
-        if tensor.shape != wanted[name].shape or tensor.dtype != wanted[name].dtype:
-            raise ConfigurationError(
-                f"{path}: weight {name!r} must be {tuple(wanted[name].shape)} {wanted[name].dtype}, "
-                f"got {tuple(tensor.shape)} {tensor.dtype}"
-            )
-        if not torch.isfinite(tensor).all():
-            raise ConfigurationError(f"{path}: weight {name!r} holds numbers that are not finite")
-    actor.load_state_dict(dict(weights))

@@ -5,16 +5,20 @@ The YAML files in configs/agents hold what differs from the defaults.
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, field_validator, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveInt, field_validator, model_validator
 
 from caster_gym.agents.control.protocol import AgentSettings
 from caster_gym.agents.learning import usual_names as usual
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 
 if TYPE_CHECKING:
     from caster_gym.agents.learning.training_run import Run
+
+MOST_LAYERS = 30
+MOST_WEIGHTS = 30_000_000  # between hidden layers, so that those of all layers fit into `WEIGHTS_BYTES`
 
 Units: TypeAlias = Annotated[int, Field(gt=0, le=16_384)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -23,7 +27,7 @@ Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 class LinearSchedule(Frozen):
     """A number that goes linearly from its start to its end while a policy is trained."""
 
-    start: PositiveFloat
+    start: Positive
     end: NonNegativeFloat = 0.0
 
     def at(self, remaining: float) -> float:
@@ -31,7 +35,7 @@ class LinearSchedule(Frozen):
         return self.end + (self.start - self.end) * max(remaining, 0.0)
 
 
-Schedule: TypeAlias = PositiveFloat | LinearSchedule
+Schedule: TypeAlias = Positive | LinearSchedule
 
 
 def scheduled(value: Schedule, remaining: float) -> float:
@@ -58,9 +62,20 @@ class LearnerSettings(AgentSettings):
 class GradientLearner(LearnerSettings):
     """What our learners have in common."""
 
-    net_arch: Annotated[tuple[Units, ...], Field(min_length=1)] = (128, 128)  # units of each layer, ReLU
+    net_arch: Annotated[tuple[Units, ...], Field(min_length=1, max_length=MOST_LAYERS)] = (
+        128,
+        128,
+    )  # units of each layer, ReLU
     gamma: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.97  # discount per control period
     learning_rate: Schedule  # a number, or {start: …, end: …}
+
+    @field_validator("net_arch")
+    @classmethod
+    def _policy_can_be_read(cls, net_arch: tuple[int, ...]) -> tuple[int, ...]:
+        count = sum(before * after for before, after in pairwise(net_arch))
+        if count > MOST_WEIGHTS:
+            raise ValueError(f"has {count} weights between its layers, at most {MOST_WEIGHTS} are read from a policy")
+        return net_arch
 
 
 class OnPolicy(GradientLearner):
@@ -73,7 +88,7 @@ class OnPolicy(GradientLearner):
     batch_size: Annotated[int, Field(ge=2)] = 2048  # of one step, an advantage could not be normalised
     n_epochs: PositiveInt = 5
     gae_lambda: Fraction = 0.95
-    clip_range: PositiveFloat = 0.2
+    clip_range: Positive = 0.2
     log_std_init: Annotated[float, Field(ge=-20.0, le=2.0)] = -0.7  # of exploration, as a share of the action
     ent_coef: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
 
@@ -150,7 +165,7 @@ class SHACSettings(GradientLearner, OnTensors):
     n_epochs: PositiveInt = 4  # of the critic
     gae_lambda: Fraction = 0.95  # λ of the critic's targets, TD(λ)
     tau: Fraction = 0.8  # share of the critic that its target takes over after every window
-    max_grad_norm: PositiveFloat = 1.0  # a longer gradient of the policy is shortened to that norm
+    max_grad_norm: Positive = 1.0  # a longer gradient of the policy is shortened to that norm
     noise: NonNegativeFloat = 0.0  # standard deviation of what exploration adds to actions
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, model_validator
 
+from caster_gym.bounded_files import expanded
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.mechanics.impulse import ImpactLaw
 from caster_gym.outlines import LEAST_EDGE, Outline, convex, outline_fault, polygon_fault
@@ -215,7 +216,7 @@ def read_arena(arena: str | Path | Mapping[str, Any] | Arena | None) -> Arena:
     if isinstance(arena, Mapping):
         return parse(Arena, arena, "arena")
     if isinstance(arena, str | Path) and is_yaml(arena):
-        path = Path(arena).expanduser()
+        path = expanded(arena)
         return parse(Arena, read_yaml(path), f"{path}: arena")
     raise ConfigurationError(f"an arena is a mapping or the name of a YAML file, got {arena!r}")
 

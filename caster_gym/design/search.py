@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, PositiveFloat
+from pydantic import AfterValidator
 
 from caster_gym.analysis.actuation import SINGULAR, worst_conditioning
 from caster_gym.arrays import Array
+from caster_gym.configuration import Positive
 from caster_gym.design.envelope import (
     Motions,
     envelope_loads,
@@ -50,7 +51,7 @@ def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
     return bounds
 
 
-Bounds: TypeAlias = Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(_ordered)]
+Bounds: TypeAlias = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
 
 
 class DesignTarget(Target):

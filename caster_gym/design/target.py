@@ -4,10 +4,10 @@ from itertools import combinations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
 from caster_gym.analysis.actuation import DEGREES_OF_FREEDOM, SINGULAR, worst_conditioning
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 from caster_gym.design.joint_sets import classify
 from caster_gym.mechanics.parameters import robot_parameters, with_load
 from caster_gym.paths.specification import PathSpecification
@@ -29,15 +29,15 @@ class Target(Frozen):
     Speed and yaw rate may be at their greatest together, accelerations too, each in whatever direction.
     """
 
-    speed: PositiveFloat  # [m/s] of C, in every direction
-    yaw_rate: PositiveFloat  # [rad/s]
-    acceleration: PositiveFloat  # [m/s²] of C over ground, in every direction
-    yaw_acceleration: PositiveFloat  # [rad/s²]
+    speed: Positive  # [m/s] of C, in every direction
+    yaw_rate: Positive  # [rad/s]
+    acceleration: Positive  # [m/s²] of C over ground, in every direction
+    yaw_acceleration: Positive  # [rad/s²]
     accelerating_up_to: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0  # [-] of speed and yaw rate; beyond, cruising
     flip_speed: NonNegativeFloat | None = None  # [m/s] up to which casters may stand at any angle; None: by (S2)
     payload: Payload | None = None
     paths: tuple[PathSpecification, ...] = ()
-    time_step: PositiveFloat = 0.02  # [s] at which paths are looked at
+    time_step: Positive = 0.02  # [s] at which paths are looked at
     actuation: Literal["all"] | tuple[str, ...] | None = None  # driven joints; None: as the robot file says
     margin: Annotated[float, Field(ge=1.0)] = 1.3  # [-] as if every torque and speed were that many times as great
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import yaml
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
-from caster_gym.configuration import Frozen, parse
+from caster_gym.configuration import Frozen, Positive, parse
 from caster_gym.durable_files import write_file
 from caster_gym.identification.recording import KIND_UNITS, Noise, record, write_recording
 from caster_gym.identification.recording_check import ContradictionError, check_recording
@@ -55,7 +55,7 @@ class IdentifySettings(Frozen):
     )  # values that differ from the robot file's, also of a payload that is known
     bounds: dict[str, tuple[float, float]] = Field(default_factory=dict)  # that differ from ours
     noise: Noise = Noise()  # standard deviations that are known; the others are estimated
-    window: PositiveFloat = WINDOW  # [s] over which motions are predicted
+    window: Positive = WINDOW  # [s] over which motions are predicted
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = CONFIDENCE
     dynamics: Dynamics = "exact"
     check: bool = True  # whether columns that contradict each other are refused before anything is fitted

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from caster_gym.arrays import Array
+from caster_gym.bounded_files import expanded
 from caster_gym.configuration import did_you_mean
 from caster_gym.identification.recording import FEWEST_ROWS, TWIST, Recording
 from caster_gym.mechanics.motors import joint_torques
@@ -45,7 +46,7 @@ def quantities_of(robot: Robot) -> dict[str, Quantity]:
 
 def read_recording(path: str | Path, robot: Robot) -> Recording:
     """A recording of a robot from a file. Raises ValueError that names column, line and value of what is wrong."""
-    path = Path(path).expanduser()
+    path = expanded(path)
     table = read_table(path).matched(quantities_of(robot))
     steering = [f"steering_{i}" for i in range(1, robot.caster_count + 1)]
     at = "torque" if all(f"torque_{joint}" in table.found for joint in robot.joints) else "motor"

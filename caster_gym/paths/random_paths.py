@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
-from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
 from caster_gym.arrays import Array, Plane
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 from caster_gym.paths.angles import Rotation
 from caster_gym.paths.trajectory import Trajectory, place, rest_to_rest, rounded_down, tabulate, whole_steps
 
@@ -28,15 +28,15 @@ class RandomPaths(Frozen):
     shape: Literal["random_paths"] = "random_paths"
     count: Annotated[int, Field(gt=0, le=100_000)] = 16
     seed: NonNegativeInt = 0
-    duration: PositiveFloat = 10.0  # [s] of each
-    extent: PositiveFloat = 3.0  # [m] greatest distance from the start
-    max_speed: PositiveFloat = 0.8  # [m/s]
-    max_acceleration: PositiveFloat = 1.0  # [m/s²]
-    max_yaw_rate: PositiveFloat = 1.5  # [rad/s] of the heading and of the tangent
+    duration: Positive = 10.0  # [s] of each
+    extent: Positive = 3.0  # [m] greatest distance from the start
+    max_speed: Positive = 0.8  # [m/s]
+    max_acceleration: Positive = 1.0  # [m/s²]
+    max_yaw_rate: Positive = 1.5  # [rad/s] of the heading and of the tangent
     heading: Literal["any"] | RandomHeading = "any"  # "any" draws one for each path
     reversing: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25  # [-] share that changes between forwards and backwards
     # [m] least radius of the tangent's turns, and least way over turn of the heading; None sets no bound
-    min_radius: PositiveFloat | None = None
+    min_radius: Positive | None = None
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where all of them start, in the world
     rotation: Rotation = 0.0  # [rad] of all of them about that point, headings included
 

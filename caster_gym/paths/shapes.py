@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 from typing import ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import PositiveFloat, PositiveInt, model_validator
+from pydantic import PositiveInt, model_validator
 
 from caster_gym.arrays import Array, Plane
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 from caster_gym.paths.angles import Rotation
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
 from caster_gym.paths.trajectory import (
@@ -34,7 +34,7 @@ class Shape(Frozen):
     _sizes: ClassVar[tuple[str, ...]]  # fields in m that make it larger
 
     shape: str
-    duration: PositiveFloat = 10.0  # [s] of all laps together, rounded to whole time steps
+    duration: Positive = 10.0  # [s] of all laps together, rounded to whole time steps
     laps: PositiveInt = 1
     heading: Heading = Tangent()
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where the origin of the shape lies, in the world
@@ -115,7 +115,7 @@ class Circle(Shape):
     """Counter-clockwise about the origin from (radius, 0): the path of chung2008, Fig. 5."""
 
     shape: Literal["circle"] = "circle"
-    radius: PositiveFloat = 1.0  # [m]
+    radius: Positive = 1.0  # [m]
     _sizes = ("radius",)
 
     def curve(self, u: Array) -> Slopes:
@@ -126,8 +126,8 @@ class Ellipse(Shape):
     """Counter-clockwise about the origin from (a, 0), at a constant rate of the eccentric anomaly."""
 
     shape: Literal["ellipse"] = "ellipse"
-    duration: PositiveFloat = 12.0  # [s]
-    semi_axes: tuple[PositiveFloat, PositiveFloat] = (1.5, 0.5)  # [m] (a, b) along x and y
+    duration: Positive = 12.0  # [s]
+    semi_axes: tuple[Positive, Positive] = (1.5, 0.5)  # [m] (a, b) along x and y
     _sizes = ("semi_axes",)
 
     def curve(self, u: Array) -> Slopes:
@@ -138,8 +138,8 @@ class Lemniscate(Shape):
     """Gerono's figure of eight, half as high as wide, from its crossing at the origin towards +x, +y."""
 
     shape: Literal["lemniscate"] = "lemniscate"
-    duration: PositiveFloat = 12.0  # [s]
-    width: PositiveFloat = 1.8  # [m]
+    duration: Positive = 12.0  # [s]
+    width: Positive = 1.8  # [m]
     _sizes = ("width",)
 
     def curve(self, u: Array) -> Slopes:
@@ -156,9 +156,9 @@ class RoundedSquare(Shape):
     """
 
     shape: Literal["rounded_square"] = "rounded_square"
-    duration: PositiveFloat = 12.0  # [s]
-    side: PositiveFloat = 1.2  # [m]
-    rounding: PositiveFloat = 0.4  # [m] that each corner takes from the ends of its sides, as a radius would
+    duration: Positive = 12.0  # [s]
+    side: Positive = 1.2  # [m]
+    rounding: Positive = 0.4  # [m] that each corner takes from the ends of its sides, as a radius would
     _sizes = ("side", "rounding")
 
     @model_validator(mode="after")

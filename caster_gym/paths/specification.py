@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from caster_gym.bounded_files import expanded
 from caster_gym.configuration import LONGEST_VALUE, ConfigurationError, is_yaml, parse, read_yaml
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.angles import plain_lists
@@ -73,11 +74,11 @@ def read_paths(path: PathLike) -> tuple[AnyPath, ...]:
 
 def _named(path: str | Path) -> AnyPath:
     """The path of a file or of the name of a shape."""
-    file = Path(path).expanduser()
+    file = expanded(path)
     if is_yaml(file):
         content = read_yaml(file)
         if isinstance(content.get("file"), str):  # relative to the file in which it stands
-            content["file"] = str(file.parent / Path(content["file"]).expanduser())
+            content["file"] = str(file.parent / expanded(content["file"]))
         return _read(content, f"{path}: path")
     if not (isinstance(path, Path) or file.suffix or len(file.parts) > 1):
         return _read({"shape": path}, "path")

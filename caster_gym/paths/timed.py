@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
 from caster_gym.arrays import Array
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain_lists, read_angles, unwrapped
 from caster_gym.paths.in_between import motion_between, room_for
 from caster_gym.paths.splines import Spline
@@ -46,7 +46,7 @@ class Timed(Frozen):
     rates: tuple[Rates, ...] | None = None
     tolerance: NonNegativeFloat | None = None  # [m] root mean square by which the motion may miss; None: as they need
     ends: Literal["rest", "free"] | None = None  # at both ends; None: at rest for less than 20 poses
-    stretch: PositiveFloat = 1.0  # [-] times are multiplied by this
+    stretch: Positive = 1.0  # [-] times are multiplied by this
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where the origin of the poses lies, in the world
     rotation: Rotation = 0.0  # [rad] of all of them about that point, headings included
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
+from pydantic import Field, NonNegativeFloat, field_validator, model_validator
 
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Frozen, Positive
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 from caster_gym.floor import Floor
 
@@ -49,7 +49,7 @@ class TaskParameters(Frozen):
 
     control_period: Annotated[float, Field(ge=SHORTEST_PERIOD, le=1.0)] = 0.02  # [s] between actions
     substeps: Annotated[int, Field(gt=0, le=MOST_SUBSTEPS)] = 4  # RK4 steps in a control period
-    corridor: PositiveFloat = 0.5  # [m] position error that ends an episode
+    corridor: Positive = 0.5  # [m] position error that ends an episode
     start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
     touching: Literal["allowed", "ends"] = "allowed"  # what touching an obstacle means for the episode
@@ -58,7 +58,7 @@ class TaskParameters(Frozen):
     floor: Literal["grip"] | Floor = "grip"  # or one of finite friction, on which wheels may slip
     effort_weight: NonNegativeFloat = 0.02
     impact_weight: NonNegativeFloat = 0.0
-    impact_scale: PositiveFloat = 0.5  # [N s] normal impulse in a control period that costs half of the weight
+    impact_scale: Positive = 0.5  # [N s] normal impulse in a control period that costs half of the weight
     coarse: Annotated[float, Field(gt=1.0)] = 10.0  # length of the wide reward kernel over that of the fine one
 
     @field_validator("floor", mode="before")

@@ -7,9 +7,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from gymnasium.spaces import Box
-from pydantic import Field, PositiveFloat, field_validator
+from pydantic import Field, field_validator
 
 from caster_gym.arrays import Array
+from caster_gym.configuration import Positive
 from caster_gym.wrappers.feature import Actions, Feature, Observations, Place, Robots, Runtime
 from caster_gym.wrappers.inner_loop import InnerLoop
 from caster_gym.wrappers.twist_loop import TwistLoop
@@ -68,9 +69,9 @@ class TwistCommands(Feature):
     kind: Literal["twist_commands"] = "twist_commands"
     redefines_actions: ClassVar[bool] = True
     frame: Literal["body", "world"] = "body"  # of vx and vy
-    max_speed: PositiveFloat = 1.0  # [m/s] along each axis
-    max_yaw_rate: PositiveFloat = 2.0  # [rad/s]
-    bandwidth: PositiveFloat = 20.0  # [1/s]
+    max_speed: Positive = 1.0  # [m/s] along each axis
+    max_yaw_rate: Positive = 2.0  # [rad/s]
+    bandwidth: Positive = 20.0  # [1/s]
 
     def runtime(self, place: Place) -> Runtime:
         """The inner loop."""
@@ -96,7 +97,7 @@ class JointSpeeds(Feature):
 
     kind: Literal["joint_speeds"] = "joint_speeds"
     redefines_actions: ClassVar[bool] = True
-    bandwidth: PositiveFloat = 50.0  # [1/s]
+    bandwidth: Positive = 50.0  # [1/s]
 
     def runtime(self, place: Place) -> Runtime:
         """The inner loops."""

@@ -3,9 +3,10 @@
 from typing import Literal
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import NonNegativeFloat
 
 from caster_gym.arrays import Array
+from caster_gym.configuration import Positive
 from caster_gym.envs.randomness import uniforms
 from caster_gym.wrappers.feature import Feature, Place, PushingRuntime, Quantities, Range, Runtime, Size, between
 
@@ -28,7 +29,7 @@ class Pushes(Feature):
     rate: NonNegativeFloat = 0.5  # [1/s] mean number of pushes; the waiting time is exponential
     force: Size = (0.0, 5.0)  # [N]
     moment: Range = 0.0  # [N m] counter-clockwise
-    duration: PositiveFloat = 0.1  # [s] rounded to control periods, at least one
+    duration: Positive = 0.1  # [s] rounded to control periods, at least one
 
     def runtime(self, place: Place) -> Runtime:
         """The present push of every robot."""

@@ -4,10 +4,10 @@ import math
 from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
 from caster_gym.arrays import Array, Flags
-from caster_gym.configuration import ConfigurationError
+from caster_gym.configuration import ConfigurationError, Positive
 from caster_gym.envs.tracking import kernel
 from caster_gym.wrappers.feature import Feature, Place, Quantities, RewardRuntime, Runtime
 
@@ -76,7 +76,7 @@ class Potential(RewardShape):
 
     kind: Literal["potential"] = "potential"
     discount: Annotated[float, Field(gt=0.0, le=1.0)]  # γ, per control period: that of the learner
-    margin: PositiveFloat  # [unit of the quantity]
+    margin: Positive  # [unit of the quantity]
     value_at_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     shape: Shape = "linear"
 

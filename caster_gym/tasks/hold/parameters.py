@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat
 
+from caster_gym.configuration import Positive
 from caster_gym.tasks.parameters import TaskParameters
 
 
@@ -19,14 +20,14 @@ class HoldParameters(TaskParameters):
 
     target: tuple[float, float, float] | None = None  # [m, m, rad] x, y and heading in W; None: the end of each path
     duration: Annotated[float, Field(gt=0.0, le=3600.0)] = 4.0  # [s] of an episode
-    corridor: PositiveFloat = 1.0  # [m] distance from the pose that ends an episode
+    corridor: Positive = 1.0  # [m] distance from the pose that ends an episode
     start_offset: NonNegativeFloat = 0.3  # [m] greatest start offset along each axis of the pose
     start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 1.0  # [rad] greatest start heading error
     position_weight: NonNegativeFloat = 0.4
     heading_weight: NonNegativeFloat = 0.3
     rest_weight: NonNegativeFloat = 0.3
-    position_scale: PositiveFloat = 0.01  # [m]
-    heading_scale: PositiveFloat = 0.02  # [rad]
-    speed_scale: PositiveFloat = 0.05  # [m/s]
-    yaw_rate_scale: PositiveFloat = 0.2  # [rad/s]
+    position_scale: Positive = 0.01  # [m]
+    heading_scale: Positive = 0.02  # [rad]
+    speed_scale: Positive = 0.05  # [m/s]
+    yaw_rate_scale: Positive = 0.2  # [rad/s]
     coarse: Annotated[float, Field(gt=1.0)] = 30.0  # length of the wide reward kernel over that of the fine one

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
+from caster_gym.configuration import Positive
 from caster_gym.tasks.parameters import TaskParameters
 
 
@@ -18,10 +19,10 @@ class TrackParameters(TaskParameters):
     position_weight: NonNegativeFloat = 0.5
     heading_weight: NonNegativeFloat = 0.3
     speed_weight: NonNegativeFloat = 0.2
-    position_scale: PositiveFloat = 0.01  # [m]
-    heading_scale: PositiveFloat = 0.02  # [rad]
-    speed_scale: PositiveFloat = 0.1  # [m/s]
-    yaw_rate_scale: PositiveFloat = 0.3  # [rad/s]
+    position_scale: Positive = 0.01  # [m]
+    heading_scale: Positive = 0.02  # [rad]
+    speed_scale: Positive = 0.1  # [m/s]
+    yaw_rate_scale: Positive = 0.3  # [rad/s]
 
     @model_validator(mode="after")
     def _horizons_are_periods(self) -> Self:
