@@ -109,6 +109,12 @@ def distance_square(errors: Errors) -> Scalar:
     return errors.ahead * errors.ahead + errors.left * errors.left
 
 
+def twist_square(errors: Errors, speed_scale: Scalar, yaw_rate_scale: Scalar) -> Scalar:
+    """Squared twist error in units of its scales. [-]"""
+    moving = (errors.vx * errors.vx + errors.vy * errors.vy) / (speed_scale * speed_scale)
+    return moving + errors.omega * errors.omega / (yaw_rate_scale * yaw_rate_scale)
+
+
 def impact_share(pressing: Scalar, scale: Scalar) -> Scalar:
     """How bad an impact was, 0 … 1: half at an impulse of `scale`."""
     return pressing / (pressing + scale)

@@ -1,5 +1,6 @@
 """How tasks are measured: what metrics are, how they are printed, and means over time of series with gaps."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -95,7 +96,12 @@ def greatest(series: Array) -> Array:
     return np.where(there.any(axis=0), most, np.nan)
 
 
+def average(numbers: Array) -> float:
+    """Mean over the episodes that have such a number; infinite if there is none."""
+    there = numbers[np.isfinite(numbers)]
+    return float(there.mean()) if there.size else math.inf
+
+
 def overall(rmse: Array) -> float:
     """Root mean square of the episodes' own, those without one left out; infinite if there is none."""
-    there = rmse[np.isfinite(rmse)]
-    return float(np.sqrt(np.mean(np.square(there)))) if there.size else float("inf")
+    return math.sqrt(average(np.square(rmse)))

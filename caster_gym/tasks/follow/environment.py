@@ -61,10 +61,7 @@ class CasterFollowEnv(TaskEnv):
 
 
 class CasterFollowVectorEnv(TaskVectorEnv):
-    """A batch of `CasterFollowEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
-
-    max_episode_steps truncates episodes earlier. All other arguments are those of `CasterFollowEnv`; seeds, autoreset
-    modes and options are those of `CasterVectorEnv`.
+    """A batch of `CasterFollowEnv`; see `TaskVectorEnv`.
 
     >>> import caster_gym, gymnasium
     >>> batch = gymnasium.make_vec("caster_gym:CasterFollow-v0", num_envs=16, path="lemniscate")

@@ -6,7 +6,7 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.tasks.episodes import Episodes
-from caster_gym.tasks.measuring import Counted, Metrics, Printed, costs, greatest, overall, rms
+from caster_gym.tasks.measuring import Counted, Metrics, Printed, average, costs, greatest, overall, rms
 
 
 class FollowMetrics(NamedTuple):
@@ -49,13 +49,12 @@ class FollowVerdict(NamedTuple):
     @classmethod
     def of(cls, metrics: FollowMetrics) -> Self:
         """The verdict on episodes."""
-        finished = metrics.finished > 0.0
         return cls(
-            float(metrics.lap_share[finished].mean()) if finished.any() else float("inf"),
+            average(metrics.lap_share),
             overall(metrics.cross_track_rmse),
             overall(metrics.heading_rmse),
             float(metrics.impacts.mean()),
-            int((~finished).sum()),
+            int((metrics.finished == 0.0).sum()),
             int(metrics.failed.sum()),
             float(metrics.reward.mean()),
         )

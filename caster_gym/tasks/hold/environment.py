@@ -46,10 +46,7 @@ class CasterHoldEnv(TaskEnv):
 
 
 class CasterHoldVectorEnv(TaskVectorEnv):
-    """A batch of `CasterHoldEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
-
-    max_episode_steps truncates episodes earlier. All other arguments are those of `CasterHoldEnv`; seeds, autoreset
-    modes and options are those of `CasterVectorEnv`.
+    """A batch of `CasterHoldEnv`; see `TaskVectorEnv`.
 
     >>> import caster_gym, gymnasium
     >>> envs = gymnasium.make_vec("caster_gym:CasterHold-v0", num_envs=3, target=(1.0, 0.5, 1.57))

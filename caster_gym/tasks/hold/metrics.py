@@ -6,7 +6,7 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.tasks.episodes import Episodes
-from caster_gym.tasks.measuring import Counted, Metrics, Printed, costs, greatest, overall, rms
+from caster_gym.tasks.measuring import Counted, Metrics, Printed, average, costs, greatest, overall, rms
 
 NEAR, TURNED = 0.01, np.radians(1.0)  # [m], [rad] errors within which a robot has settled
 
@@ -44,11 +44,10 @@ class HoldVerdict(NamedTuple):
     @classmethod
     def of(cls, metrics: HoldMetrics) -> Self:
         """The verdict on episodes."""
-        settled = metrics.settled > 0.0
         return cls(
-            float(metrics.settling_time[settled].mean()) if settled.any() else float("inf"),
+            average(metrics.settling_time),
             overall(metrics.steady_position),
-            int((~settled).sum()),
+            int((metrics.settled == 0.0).sum()),
             int(metrics.failed.sum()),
             float(metrics.reward.mean()),
         )

@@ -2,7 +2,15 @@
 
 from typing import NamedTuple
 
-from caster_gym.envs.tracking import Moment, both_kernels, distance_square, impact_share, kernel, turn_square
+from caster_gym.envs.tracking import (
+    Moment,
+    both_kernels,
+    distance_square,
+    impact_share,
+    kernel,
+    turn_square,
+    twist_square,
+)
 from caster_gym.mechanics.scalars import Scalar
 
 
@@ -41,8 +49,7 @@ def reward(moment: Moment, weights: HoldWeights) -> HoldTerms:
     The term `alive` equals the greatest cost. The pose is at rest, so that errors of the twist are the robot's own.
     """
     errors = moment.errors
-    rate = (errors.vx * errors.vx + errors.vy * errors.vy) / (weights.speed_scale * weights.speed_scale)
-    rate = rate + errors.omega * errors.omega / (weights.yaw_rate_scale * weights.yaw_rate_scale)
+    rate = twist_square(errors, weights.speed_scale, weights.yaw_rate_scale)
     near = both_kernels(distance_square(errors), weights.position_scale, weights.coarse)
     turned = both_kernels(turn_square(errors), weights.heading_scale, weights.coarse)
     return HoldTerms(

@@ -111,10 +111,7 @@ class CasterTrackEnv(TaskEnv):
 
 
 class CasterTrackVectorEnv(TaskVectorEnv):
-    """A batch of `CasterTrackEnv`, equal bit for bit to a SyncVectorEnv of single ones, infos included.
-
-    max_episode_steps truncates episodes before their trajectory ends. All other arguments are those of
-    `CasterTrackEnv`; seeds, autoreset modes and options are those of `CasterVectorEnv`.
+    """A batch of `CasterTrackEnv`; see `TaskVectorEnv`.
 
     >>> import caster_gym, gymnasium
     >>> batch = gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16, path="lemniscate")

@@ -5,7 +5,15 @@ Rational kernels 1 / (1 + e²/ℓ²) keep rewards bounded and free of roots and 
 
 from typing import NamedTuple
 
-from caster_gym.envs.tracking import Moment, both_kernels, distance_square, impact_share, kernel, turn_square
+from caster_gym.envs.tracking import (
+    Moment,
+    both_kernels,
+    distance_square,
+    impact_share,
+    kernel,
+    turn_square,
+    twist_square,
+)
 from caster_gym.mechanics.scalars import Scalar
 
 
@@ -44,8 +52,7 @@ def reward(moment: Moment, weights: TrackWeights) -> TrackTerms:
     The term `alive` equals the greatest cost.
     """
     errors, wide = moment.errors, weights.coarse
-    rate = (errors.vx * errors.vx + errors.vy * errors.vy) / (weights.speed_scale * weights.speed_scale)
-    rate = rate + errors.omega * errors.omega / (weights.yaw_rate_scale * weights.yaw_rate_scale)
+    rate = twist_square(errors, weights.speed_scale, weights.yaw_rate_scale)
     position = both_kernels(distance_square(errors), weights.position_scale, wide)
     heading = both_kernels(turn_square(errors), weights.heading_scale, wide)
     speed = 0.5 * (kernel(rate, 1.0) + kernel(rate, wide))
