@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, field_validator, model_validator
@@ -15,6 +15,8 @@ from caster_gym.floor import GREATEST
 from caster_gym.outlines import Corners, Outline, convex, polygon_fault
 from caster_gym.plausibility import warn_if_implausible
 from caster_gym.shipped_files import find, names_of, own_file
+
+Pair: TypeAlias = tuple[float, float]
 
 
 class Motor(Frozen):
@@ -41,7 +43,7 @@ class Link(Frozen):
 
     mass: NonNegativeFloat  # [kg]
     inertia: NonNegativeFloat  # [kg m²] about a vertical axis through its mass centre
-    com: tuple[float, float] = (0.0, 0.0)  # [m] (l, q): behind and left of the steering axis
+    com: Pair = (0.0, 0.0)  # [m] (l, q): behind and left of the steering axis
 
 
 class Caster(Frozen):
@@ -57,10 +59,7 @@ class Caster(Frozen):
     roll: Motor
     steer: Motor
     scrub: NonNegativeFloat = 0.0  # [N m s/rad] of the contact patch against yaw over ground
-    gear: tuple[tuple[float, float], tuple[float, float]] = (
-        (1.0, 0.0),
-        (0.0, 1.0),
-    )  # motor speeds = gear · joint rates
+    gear: tuple[Pair, Pair] = ((1.0, 0.0), (0.0, 1.0))  # motor speeds = gear · joint rates
 
     @field_validator("trail", mode="before")
     @classmethod
@@ -76,7 +75,7 @@ class Caster(Frozen):
 
     @field_validator("gear")
     @classmethod
-    def _gear_is_invertible(cls, gear: tuple[tuple[float, float], tuple[float, float]]) -> Any:
+    def _gear_is_invertible(cls, gear: tuple[Pair, Pair]) -> tuple[Pair, Pair]:
         (a, b), (c, d) = gear
         if abs(a * d - b * c) < 1e-9 * max(abs(a * d), abs(b * c), 1e-9):
             raise ValueError("must be invertible: two motors that turn together cannot drive two joints")
@@ -99,7 +98,7 @@ class Footprint(Frozen):
     """Outline of the platform in B: a disc of a radius around C, or a convex polygon."""
 
     disc: Positive | None = None  # [m]
-    polygon: Annotated[tuple[tuple[float, float], ...], Field(min_length=3)] | None = None  # [m] counter-clockwise
+    polygon: Annotated[tuple[Pair, ...], Field(min_length=3)] | None = None  # [m] counter-clockwise
 
     @field_validator("polygon")
     @classmethod
@@ -132,17 +131,13 @@ class Platform(Frozen):
     """The platform without its casters."""
 
     usual_names: ClassVar[Mapping[str, str]] = {
-        "z": "height",
-        "com_height": "height",
-        "height_of_com": "height",
-        "com_z": "height",
-        "centre_of_mass": "com",
-        "center_of_mass": "com",
+        **dict.fromkeys(("z", "com_height", "height_of_com", "com_z"), "height"),
+        **dict.fromkeys(("centre_of_mass", "center_of_mass"), "com"),
     }
 
     mass: Positive  # [kg]
     inertia: Positive  # [kg m²] about a vertical axis through its mass centre
-    com: tuple[float, float] = (0.0, 0.0)  # [m] mass centre in B
+    com: Pair = (0.0, 0.0)  # [m] mass centre in B
     height: NonNegativeFloat = 0.0  # [m] of the mass centre above the floor; 0 leaves loads on wheels as at rest
     footprint: Footprint
 
@@ -248,18 +243,11 @@ class Robot(Frozen):
 
     def without_wheels(self) -> "Robot":
         """The same robot with massless wheels, links and rotors: the "incomplete model" of chung2008."""
-        nothing = {"mass": 0.0, "spin_inertia": 0.0, "yaw_inertia": 0.0}
-        casters = [
-            caster.model_copy(
-                update={
-                    "wheel": Wheel(**nothing),
-                    "link": Link(mass=0.0, inertia=0.0),
-                    "roll": caster.roll.model_copy(update={"rotor": 0.0, "armature": 0.0}),
-                    "steer": caster.steer.model_copy(update={"rotor": 0.0, "armature": 0.0}),
-                }
-            )
-            for caster in self.casters
-        ]
+        parts = {"wheel": Wheel(mass=0.0, spin_inertia=0.0, yaw_inertia=0.0), "link": Link(mass=0.0, inertia=0.0)}
+        casters = []
+        for caster in self.casters:
+            roll, steer = (motor.model_copy(update={"rotor": 0.0, "armature": 0.0}) for motor in caster.motors)
+            casters.append(caster.model_copy(update={**parts, "roll": roll, "steer": steer}))
         return self.model_copy(update={"casters": tuple(casters)})
 
 

@@ -32,12 +32,7 @@ from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.agents.learning.sb3_learning import make_learner
-from caster_gym.agents.learning.settings import (
-    LearnerSettings,
-    PPOSettings,
-    RslPPOSettings,
-    SHACSettings,
-)
+from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SHACSettings
 from caster_gym.agents.learning.shac import ShortHorizon, make_task
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.agents.registry import read_agent
@@ -48,7 +43,8 @@ from caster_gym.report.run_folder import check_can_be_made
 from caster_gym.shipped_files import read_settings
 from scripts.speed_timing import RATE, Row, middle, run
 from scripts.training_busy import Beside, train_beside
-from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, write_page
+from scripts.training_page import FREE, OURS, write_page
+from scripts.training_results import Course, Occasion, Point, Results, Trial, WindowCosts
 
 BANK = 64  # steps drawn beforehand
 GOAL = 5e-3  # [m] position RMSE on validation paths

@@ -1,90 +1,23 @@
 """The page of `scripts.measure_training`: tables, a figure, and what they say."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
-from caster_gym.agents.learning.settings import LearnerSettings, OnPolicy
+from caster_gym.agents.learning.settings import OnPolicy
 from caster_gym.report.figures import COLOURS, new_figure
 from caster_gym.report.pages import join_parts, paragraph
 from caster_gym.report.provenance import versions
 from caster_gym.report.tables import markdown_table, write_csv
 from scripts.speed_page import processor
-from scripts.speed_timing import RATE, Ratio, Values, at_least, middle, shown, spread
-from scripts.training_busy import Beside, section
+from scripts.speed_timing import RATE, Ratio, at_least, middle, shown, spread
+from scripts.training_busy import section
+from scripts.training_results import Course, Occasion, Point, Results, WindowCosts
 
 OURS, FREE = "PPO on our robots", "PPO on robots that cost nothing"
 SHARE = Ratio("share of a zero-cost environment's speed", OURS, FREE, 100.0, at_least(95.0))
 HEADS = ("learner", "seed", "control periods", "processor time", "best of the run")
 LINES = (COLOURS[0], COLOURS[3], COLOURS[4], COLOURS[5])  # one for each learner
-
-
-class Point(NamedTuple):
-    """A validation of a training run."""
-
-    steps: int  # control periods so far
-    seconds: float  # of the processor so far, validations left out
-    verdict: Any  # of the task's metrics
-
-
-class Trial(NamedTuple):
-    """One episode of a trained policy on a test path."""
-
-    path: str
-    position_rmse: float  # [m]
-    failed: bool
-
-
-class Course(NamedTuple):
-    """A training run."""
-
-    learner: str
-    seed: int
-    points: tuple[Point, ...]
-    trials: tuple[Trial, ...] = ()  # of its best policy
-
-    def first(self, goal: float) -> Point | None:
-        """The validation that first meets the goal, a position RMSE [m], without a failure."""
-        met = (one for one in self.points if not one.verdict.failures and one.verdict.position_rmse < goal)
-        return next(met, None)
-
-    @property
-    def best(self) -> Point:
-        """The validation of the policy that is kept."""
-        return max(self.points, key=lambda one: one.verdict.merit)
-
-
-class WindowCosts(NamedTuple):
-    """Seconds of the processor that SHAC takes."""
-
-    periods: int  # of a window, all robots together
-    substeps: int  # RK4 steps in each of them
-    forward: float  # simulation, policy and rewards of a window
-    backward: float  # their gradient
-    critic: float
-    compiling: float  # and one window, on a machine that has never compiled it
-    fetching: float  # the same from then on, the compiled code being on disk
-
-
-class Results(NamedTuple):
-    """All that was measured."""
-
-    agents: Mapping[str, LearnerSettings]
-    share: Values
-    courses: Sequence[Course]
-    costs: Mapping[str, WindowCosts]
-    rates: Mapping[str, tuple[LearnerSettings, float]]  # of learners on tensors [steps/s]
-    beside: Beside | None = None  # training with one thread and with two, beside busy processes
-
-
-class Occasion(NamedTuple):
-    """Where and how it was measured."""
-
-    command: str
-    turns: int
-    goal: float  # [m]
-    loads: tuple[float, float]  # of the machine at the start and at the end
 
 
 def write_page(path: Path, results: Results, occasion: Occasion) -> None:

@@ -54,7 +54,9 @@ def loaded():
 def test_without_noise_the_truth_is_found(name, seed, starts, with_twist):
     robot, truth = load_robot(name), TRUTH[name]
     recording = record(robot_with(robot, truth), 4.0, 0.02, seed=seed)
-    found = identify(robot, recording if with_twist else recording.without_twist(), tuple(truth), starts, window=WINDOW)
+    found = identify(
+        robot, recording if with_twist else replace(recording, twist=None), tuple(truth), starts, window=WINDOW
+    )
     # the fit's steps are corrected to the finer ones of the recording to first order, and friction's law may be another
     assert_allclose(found.estimates, list(truth.values()), rtol=1e-2)
     assert_allclose(found.estimates[[0, 1, 2, -1]], np.array(list(truth.values()))[[0, 1, 2, -1]], rtol=1e-4)

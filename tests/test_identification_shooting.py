@@ -1,5 +1,7 @@
 """caster_gym.identification.shooting: windows of a recording, their prediction, and its derivatives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -77,7 +79,7 @@ def test_the_robot_of_a_recording_predicts_it_and_turns_do_not_count():
 def test_velocities_are_first_guessed_from_poses():
     robot = load_robot("chung2008")
     recording = record(robot, 1.0, 0.01, seed=2)
-    guess = Shooting(robot, recording.without_twist(), (), {}, 0.1).first_guess(np.array([]))[1:-1]
+    guess = Shooting(robot, replace(recording, twist=None), (), {}, 0.1).first_guess(np.array([]))[1:-1]
     truth = Shooting(robot, recording, (), {}, 0.1).first_guess(np.array([]))[1:-1]
     # a parabola over 7 samples misses h² v''/6 · 7; accelerations change within 0.1 s
     assert_allclose(guess[:, 3:6], truth[:, 3:6], atol=0.05 * np.abs(truth[:, 3:6]).max())

@@ -27,7 +27,8 @@ from scripts.measure_training import (
     window_costs,
 )
 from scripts.training_busy import Beside, Round, busy_processes, section, train_beside
-from scripts.training_page import FREE, OURS, Course, Occasion, Point, Results, Trial, WindowCosts, page
+from scripts.training_page import FREE, OURS, page
+from scripts.training_results import Course, Occasion, Point, Results, Trial, WindowCosts
 
 PATH = {"shape": "random_paths", "duration": 3.0, "max_speed": 0.3, "count": 2}
 CONTENT = {kind: [{**PATH, "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}

@@ -1,6 +1,6 @@
 """Learning by Stable-Baselines3, on the native batch of NumPy arrays."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -19,40 +19,35 @@ from caster_gym.agents.learning.training_run import Run
 def make_learner(settings: PPOSettings | SACSettings, environment: VecEnv, seed: int) -> BaseAlgorithm:
     """A fresh SB3 algorithm."""
     rate = settings.learning_rate
-    schedule = rate.at if isinstance(rate, LinearSchedule) else rate
     policy: dict[str, Any] = {"net_arch": list(settings.net_arch), "activation_fn": torch.nn.ReLU}
+    shared: dict[str, Any] = {
+        "policy": "MlpPolicy",
+        "env": environment,
+        "learning_rate": rate.at if isinstance(rate, LinearSchedule) else rate,
+        "batch_size": settings.batch_size,
+        "gamma": settings.gamma,
+        "ent_coef": settings.ent_coef,
+        "seed": seed,
+        "device": "cpu",
+    }
     if isinstance(settings, PPOSettings):
         return PPO(
-            "MlpPolicy",
-            environment,
-            learning_rate=schedule,
+            **shared,
             n_steps=settings.n_steps,
-            batch_size=settings.batch_size,
             n_epochs=settings.n_epochs,
-            gamma=settings.gamma,
             gae_lambda=settings.gae_lambda,
             clip_range=settings.clip_range,
-            ent_coef=settings.ent_coef,
             policy_kwargs={**policy, "log_std_init": settings.log_std_init},
-            seed=seed,
-            device="cpu",
         )
     return SAC(
-        "MlpPolicy",
-        environment,
-        learning_rate=schedule,
+        **shared,
         buffer_size=settings.buffer_size,
         learning_starts=settings.learning_starts,
-        batch_size=settings.batch_size,
         tau=settings.tau,
-        gamma=settings.gamma,
         train_freq=settings.train_freq,
         gradient_steps=settings.gradient_steps,
-        ent_coef=settings.ent_coef,
         target_entropy=settings.target_entropy_per_motor * int(np.prod(environment.action_space.shape or ())),
         policy_kwargs=policy,
-        seed=seed,
-        device="cpu",
     )
 
 
@@ -60,11 +55,12 @@ def actor_of(learner: BaseAlgorithm, settings: PPOSettings | SACSettings) -> Act
     """The deterministic part of a learner's policy, with a copy of its weights."""
     policy: Any = learner.policy
     if isinstance(learner, PPO):
-        layers, head, squash = policy.mlp_extractor.policy_net, policy.action_net, "clip"
+        layers, head = policy.mlp_extractor.policy_net, policy.action_net
     else:
-        layers, head, squash = policy.actor.latent_pi, policy.actor.mu, "tanh"
+        layers, head = policy.actor.latent_pi, policy.actor.mu
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
-    actor = Actor(linear[0].in_features, settings.net_arch, head.out_features, "tanh" if squash == "tanh" else "clip")
+    squash: Literal["clip", "tanh"] = "clip" if isinstance(learner, PPO) else "tanh"
+    actor = Actor(linear[0].in_features, settings.net_arch, head.out_features, squash)
     for ours, theirs in zip([*actor.layers, actor.head], [*linear, head], strict=True):
         ours.load_state_dict({name: tensor.clone() for name, tensor in theirs.state_dict().items()})
     return actor

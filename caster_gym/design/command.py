@@ -9,7 +9,8 @@ from pydantic import field_validator
 
 from caster_gym.configuration import parse, read_yaml
 from caster_gym.design.figures import write_design_figure
-from caster_gym.design.search import Design, DesignTarget, check_designable, optimise
+from caster_gym.design.region import DesignTarget, check_designable
+from caster_gym.design.search import Design, optimise
 from caster_gym.design.sizing import MotorRequirement, Requirement, require
 from caster_gym.design.target import driven_as
 from caster_gym.durable_files import write_file

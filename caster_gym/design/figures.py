@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from caster_gym.design.search import Design, DesignTarget, wheel_room
+from caster_gym.design.region import DesignTarget, wheel_room
+from caster_gym.design.search import Design
 from caster_gym.design.sizing import MotorRequirement, Requirement
 from caster_gym.report.figures import COLOURS, empty_figure, legend_below, save_figure
 

@@ -46,7 +46,8 @@ class RobotModel(ModelInputs[Numbers]):
     def jacobian(self, steering: ArrayLike, joints: str | Sequence[str] = "all") -> Numbers:
         """Rows (..., J, 3) that give the rates of the named joints from the twist; joints in the order given."""
         directions = self._directions(steering)
-        names = self.robot.joints if joints == "all" else check_joints(_listed(joints), self.robot.caster_count)
+        listed = (joints,) if isinstance(joints, str) else tuple(joints)
+        names = self.robot.joints if joints == "all" else check_joints(listed, self.robot.caster_count)
         rows = each(caster.rate_rows, (), directions, self._parameters.casters)
         chosen = [rows[j // 2][1 + j % 2] for j in map(self.robot.joints.index, names)]
         return self._stack([self._stack(row) for row in chosen], -2)
@@ -129,8 +130,7 @@ class RobotModel(ModelInputs[Numbers]):
 
     def motor_wrenches(self, steering: ArrayLike) -> Numbers:
         """Wrenches (..., 3, driven) at C, in B, of the driven motors, each at its greatest torque. [N, N, N m]"""
-        pairs_of = each(actuation.motor_wrenches, (), self._directions(steering), self._parameters.casters)
-        wrenches = flatten(pairs_of)
+        wrenches = flatten(each(actuation.motor_wrenches, (), self._directions(steering), self._parameters.casters))
         return self._stack([self._stack(wrenches[j]) for j in self.robot.driven_indices])
 
     def conditioning(self, steering: ArrayLike) -> Numbers:
@@ -292,10 +292,6 @@ class Model(RobotModel[Array]):
 
     def _stack(self, parts: Any, axis: int = -1) -> Array:
         return np.stack(np.broadcast_arrays(*parts), axis)
-
-
-def _listed(joints: str | Sequence[str]) -> tuple[str, ...]:
-    return (joints,) if isinstance(joints, str) else tuple(joints)
 
 
 def _listed_table(part: Any) -> Any:

@@ -2,12 +2,13 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from caster_gym.analysis.frames import turn_planar
 from caster_gym.arrays import Array
 from caster_gym.identification.recording import Recording
 from caster_gym.robot import Robot
@@ -17,10 +18,7 @@ _LONGEST_SHIFT = 10  # samples
 _SMALLER = {1e2: "cm", 1e3: "mm"}
 _ONE_TURN = 2.0 * math.pi + 0.1  # [rad] and some noise
 _ONE_RATIO = 0.02  # [-] by which ratios of casters differ that are one
-_TORQUES_TOO = " (the torques with them, if those are in the same order)"
 _ALL_ORDERS = 4  # casters, beyond which columns are only swapped in pairs
-
-# Suppressions below: mypy follows neither the fields that `replace` is given by name nor defaults of lambdas.
 
 
 class Mend(NamedTuple):
@@ -46,70 +44,63 @@ def mends(recording: Recording, robot: Robot) -> Iterator[Mend]:
     yield from _shifts(recording)
 
 
+def _changed(name: str, wrong: str, advice: str, change: Callable[[Recording, Array], Array]) -> Mend:
+    """The mend of the columns (K, n) of one field."""
+    return Mend(wrong, advice, lambda r: r.change_columns(lambda k, own: change(r, own) if k == name else own), name)
+
+
 def negated(name: str, which: Sequence[int]) -> Mend:
     """Columns of casters (from 0) with the other sign."""
     columns = listed(f"{name}_{i + 1}" for i in which)
-    factors = dict.fromkeys(which, -1.0)
-    return Mend(
-        f"{columns} {_have(which)} the other sign",
-        f"negate {columns}",
-        lambda r: _scaled(r, name, factors),
-        name,
-    )
+    return _scaled(name, f"{columns} {_have(which)} the other sign", f"negate {columns}", dict.fromkeys(which, -1.0))
 
 
 def turned(zeros: dict[int, float]) -> Mend:
     """Steering angles of casters (from 0) less their zeros [rad]."""
     columns = listed(f"steering_{i + 1}" for i in zeros)
     values = listed(f"{zero:.4g}" for zero in zeros.values())
-    return Mend(
-        f"{columns} {_have(list(zeros))} a zero of {values} rad: they are to be the angles of the rolling directions "
+    return _changed(
+        "steering",
+        f"{columns} {_have(zeros)} a zero of {values} rad: they are to be the angles of the rolling directions "
         "from the body's x-axis",
         f"subtract {values} rad from {columns}",
-        lambda r: replace(r, steering=r.steering - np.array([zeros.get(i, 0.0) for i in range(r.steering.shape[1])])),
-        "steering",
+        lambda r, steering: steering - np.array([zeros.get(i, 0.0) for i in range(steering.shape[1])]),
     )
 
 
 def _headings() -> Iterator[Mend]:
-    def of(change: Callable[[Array], Array]) -> Callable[[Recording], Recording]:
-        return lambda r: replace(r, pose=np.column_stack([r.pose[:, :2], change(r.pose[:, 2])]))
+    def of(wrong: str, advice: str, change: Callable[[Array], Array]) -> Mend:
+        return _changed("pose", wrong, advice, lambda _, pose: np.column_stack([pose[:, :2], change(pose[:, 2])]))
 
-    yield Mend("heading has the other sign (it is to grow counter-clockwise)", "negate heading", of(lambda b: -b))
-    yield Mend(
-        "heading is measured clockwise from the y-axis (from north)",
-        "write 'pi/2 - heading' instead of heading",
-        of(lambda b: 0.5 * np.pi - b),
-    )
-    yield Mend("heading is in degrees", "write heading [deg] into the header", of(lambda b: b * _DEGREE))
-    yield Mend(
-        "heading is in radians, though its header says degrees",
-        "write heading [rad] into the header",
-        of(lambda b: b / _DEGREE),
-    )
+    yield of("heading has the other sign (it is to grow counter-clockwise)", "negate heading", lambda b: -b)
+    clockwise = "heading is measured clockwise from the y-axis (from north)"
+    yield of(clockwise, "write 'pi/2 - heading' instead of heading", lambda b: 0.5 * np.pi - b)
+    yield of("heading is in degrees", _in_header(["heading"], "deg"), lambda b: b * _DEGREE)
+    radians = "heading is in radians, though its header says degrees"
+    yield of(radians, _in_header(["heading"], "rad"), lambda b: b / _DEGREE)
     for degrees in (90, -90, 180):
-        yield Mend(
+        yield of(
             f"heading is {degrees}° ahead of the body's x-axis",
             f"subtract {degrees}° from heading",
-            of(lambda b, ahead=degrees * _DEGREE: b - ahead),  # type: ignore[misc]
+            lambda b, ahead=degrees * _DEGREE: b - ahead,  # type: ignore[misc]  # mypy does not follow defaults
         )
 
 
 def _positions() -> Iterator[Mend]:
-    def of(matrix: Iterable[Iterable[float]]) -> Callable[[Recording], Recording]:
+    def of(wrong: str, advice: str, matrix: Iterable[Iterable[float]]) -> Mend:
         turn = np.array([*matrix])
-        return lambda r: replace(r, pose=np.column_stack([r.pose[:, :2] @ turn.T, r.pose[:, 2]]))
+        return _changed("pose", wrong, advice, lambda _, pose: np.column_stack([pose[:, :2] @ turn.T, pose[:, 2]]))
 
-    yield Mend("x and y are swapped", "swap the columns x and y", of([[0, 1], [1, 0]]))
-    yield Mend("y has the other sign", "negate y", of([[1, 0], [0, -1]]))
-    yield Mend("x has the other sign", "negate x", of([[-1, 0], [0, 1]]))
-    yield Mend("x and y have the other sign", "negate x and y", of([[-1, 0], [0, -1]]))
+    yield of("x and y are swapped", "swap the columns x and y", [[0, 1], [1, 0]])
+    yield of("y has the other sign", "negate y", [[1, 0], [0, -1]])
+    yield of("x has the other sign", "negate x", [[-1, 0], [0, 1]])
+    yield of("x and y have the other sign", "negate x and y", [[-1, 0], [0, -1]])
     for factor, unit in ((1e-3, "mm"), (1e-2, "cm"), (0.3048, "feet"), (0.0254, "inches")):
         advice = f"multiply x and y by {factor}" if len(unit) > 2 else _in_header(["x", "y"], unit)
-        yield Mend(f"x and y are in {unit}", advice, of([[factor, 0], [0, factor]]))
+        yield of(f"x and y are in {unit}", advice, [[factor, 0], [0, factor]])
     for factor, unit in _SMALLER.items():
         words = f"x and y are {factor:g} times too small, as metres are that were read as {unit}"
-        yield Mend(words, _in_header(["x", "y"], "m"), of([[factor, 0], [0, factor]]))
+        yield of(words, _in_header(["x", "y"], "m"), [[factor, 0], [0, factor]])
 
 
 def _columns(name: str, count: int) -> Iterator[Mend]:
@@ -121,17 +112,12 @@ def _columns(name: str, count: int) -> Iterator[Mend]:
                 yield negated(name, which)
     for which in (*((i,) for i in everyone), tuple(everyone)):
         columns = [f"{name}_{i + 1}" for i in which]
-        for factor, unit, wrongly in ((_DEGREE, "deg", "rad"), (1.0 / _DEGREE, "rad", "deg")):
-            yield Mend(
-                f"{listed(columns)} {_are(columns)} in {_UNIT_WORDS[unit]}, not in {_UNIT_WORDS[wrongly]}",
-                _in_header(columns, unit),
-                lambda r, which=which, factor=factor: _scaled(r, name, dict.fromkeys(which, factor)),  # type: ignore[misc, arg-type]
-                name,
-            )
+        for unit, units in (("deg", "degrees, not in radians"), ("rad", "radians, not in degrees")):
+            factor = _DEGREE if unit == "deg" else 1.0 / _DEGREE
+            words = f"{listed(columns)} {_are(columns)} in {units}"
+            yield _scaled(name, words, _in_header(columns, unit), dict.fromkeys(which, factor))
     yield from (_reordered((name,), order) for order in _orders(count))
-    if name == "rolling":
-        return
-    for degrees in (90, -90, 180):
+    for degrees in (90, -90, 180) if name == "steering" else ():
         yield turned(dict.fromkeys(everyone, degrees * _DEGREE))
         for i in everyone:
             yield turned({i: degrees * _DEGREE})
@@ -156,7 +142,7 @@ def _reordered(names: tuple[str, ...], order: tuple[int, ...]) -> Mend:
     calls = listed(f"{name}_{j + 1} {name}_{i + 1}" for name in names for i, j in moved)
     return Mend(
         f"{columns} are columns of other casters",
-        f"call {calls}{_TORQUES_TOO}",
+        f"call {calls} (the torques with them, if those are in the same order)",
         lambda r: r.change_columns(lambda name, own: own[:, list(order)] if name in names else own),
         names[0],
     )
@@ -175,34 +161,22 @@ def _orders(count: int) -> Iterator[tuple[int, ...]]:
 def _rolling_units(recording: Recording, robot: Robot) -> Iterator[Mend]:
     if recording.rolling is None:
         return
-    everyone = range(robot.caster_count)
-    columns = listed(f"rolling_{i + 1}" for i in everyone)
-    radii = {i: 1.0 / caster.radius for i, caster in enumerate(robot.casters)}
-    yield Mend(
-        f"{columns} are ways in metres, not angles",
-        f"divide {columns} by the wheels' radii",
-        lambda r: _scaled(r, "rolling", radii),
-        "rolling",
-    )
-    yield Mend(
-        f"{columns} are in turns, not in radians",
-        f"multiply {columns} by 2 pi",
-        lambda r: _scaled(r, "rolling", dict.fromkeys(everyone, 2.0 * math.pi)),
-        "rolling",
-    )
-    yield Mend(
-        f"{columns} are rates in rad/s, not angles",
-        f"write the sum of rate times time step into {columns}",
-        lambda r: replace(r, rolling=_summed(r.rolling, r.time_step)),
-        "rolling",
-    )
+    columns = listed(f"rolling_{i + 1}" for i in range(robot.caster_count))
 
+    def of(wrong: str, advice: str, change: Callable[[Recording, Array], Array]) -> Mend:
+        return _changed("rolling", f"{columns} {wrong}", advice, change)
+
+    radii = np.array([1.0 / caster.radius for caster in robot.casters])
+    yield of("are ways in metres, not angles", f"divide {columns} by the wheels' radii", lambda _, ways: ways * radii)
+    in_turns = f"multiply {columns} by 2 pi"
+    yield of("are in turns, not in radians", in_turns, lambda _, turns: turns * (2.0 * math.pi))
+    summed = f"write the sum of rate times time step into {columns}"
+    yield of("are rates in rad/s, not angles", summed, lambda r, rates: _summed(rates, r.time_step))
     if float(np.ptp(recording.rolling, axis=0).max()) <= _ONE_TURN:
-        yield Mend(
-            f"{columns} start again after each turn, as encoders of a single turn do",
+        yield of(
+            "start again after each turn, as encoders of a single turn do",
             f"add 2 pi to {columns}, or subtract it, from each jump on, as numpy.unwrap does",
-            lambda r: replace(r, rolling=None if r.rolling is None else np.unwrap(r.rolling, axis=0)),
-            "rolling",
+            lambda _, angles: np.unwrap(angles, axis=0),
         )
 
 
@@ -213,18 +187,16 @@ def scaled_up(ratios: dict[int, float]) -> Mend:
     if all(abs(value / middle - 1.0) < _ONE_RATIO for value in values):
         values, ratios = [middle], dict.fromkeys(ratios, middle)
     sizes, factors = ([f"{value:.4g}" for value in some] for some in (values, [1.0 / value for value in values]))
-    return Mend(
+    return _scaled(
+        "rolling",
         f"{listed(columns)} {_are(columns)} {listed(sizes)} times the wheels' angles in radians, such as the counts of "
         "an encoder or the angle of a motor before its gears",
         f"multiply {listed(columns)} by {listed(factors)}",
-        lambda r: _scaled(r, "rolling", {i: 1.0 / ratio for i, ratio in ratios.items()}),
-        "rolling",
+        {i: 1.0 / ratio for i, ratio in ratios.items()},
     )
 
 
-def _summed(rates: Array | None, time_step: float) -> Array | None:
-    if rates is None:
-        return None
+def _summed(rates: Array, time_step: float) -> Array:
     return np.concatenate([np.zeros_like(rates[:1]), np.cumsum(0.5 * time_step * (rates[1:] + rates[:-1]), axis=0)])
 
 
@@ -232,18 +204,17 @@ def _twists(recording: Recording) -> Iterator[Mend]:
     if recording.twist is None:
         return
 
-    def of(wrong: str, advice: str, change: Callable[[Recording, Array], Array]) -> Mend:
-        return Mend(wrong, advice, lambda r: replace(r, twist=None if r.twist is None else change(r, r.twist)), "twist")
-
     def times(wrong: str, advice: str, *factors: float) -> Mend:
-        return of(wrong, advice, lambda r, twist: twist * np.array(factors))
+        return _changed("twist", wrong, advice, lambda _, twist: twist * np.array(factors))
 
-    yield of(
+    yield _changed(
+        "twist",
         "vx and vy are in the world's frame, not in the body's",
         "turn (vx, vy) by minus the heading",
-        lambda r, twist: _into_body(twist, r.pose[:, 2]),
+        lambda r, twist: turn_planar(twist, np.exp(-1j * r.pose[:, 2])),
     )
-    yield of("vx and vy are swapped", "swap the columns vx and vy", lambda r, twist: twist[:, [1, 0, 2]])
+    swapped = "vx and vy are swapped"
+    yield _changed("twist", swapped, "swap the columns vx and vy", lambda _, twist: twist[:, [1, 0, 2]])
     yield times("vx has the other sign", "negate vx", -1, 1, 1)
     yield times("vy has the other sign (it is to grow to the left)", "negate vy", 1, -1, 1)
     yield times("vx and vy have the other sign", "negate vx and vy", -1, -1, 1)
@@ -253,14 +224,9 @@ def _twists(recording: Recording) -> Iterator[Mend]:
     for factor, unit in ((1e-3, "mm/s"), (1e-2, "cm/s")):
         yield times(f"vx and vy are in {unit}", _in_header(["vx", "vy"], unit), factor, factor, 1)
     yield times("vx and vy are in km/h", "divide vx and vy by 3.6", 1 / 3.6, 1 / 3.6, 1)
-    for factor in (1e2, 1e3):
-        words = f"vx and vy are {factor:g} times too small, as m/s are that were read as {_SMALLER[factor]}/s"
+    for factor, unit in _SMALLER.items():
+        words = f"vx and vy are {factor:g} times too small, as m/s are that were read as {unit}/s"
         yield times(words, _in_header(["vx", "vy"], "m/s"), factor, factor, 1)
-
-
-def _into_body(twist: Array, heading: Array) -> Array:
-    c, s = np.cos(heading), np.sin(heading)
-    return np.column_stack([c * twist[:, 0] + s * twist[:, 1], c * twist[:, 1] - s * twist[:, 0], twist[:, 2]])
 
 
 def _times() -> Iterator[Mend]:
@@ -277,17 +243,12 @@ def _times() -> Iterator[Mend]:
 
 def _shifts(recording: Recording) -> Iterator[Mend]:
     """Columns from an earlier or a later moment than the others of their row."""
-    groups = {
-        "steering": listed(f"steering_{i + 1}" for i in range(recording.steering.shape[1])),
-        "rolling": listed(f"rolling_{i + 1}" for i in range(recording.steering.shape[1])),
-        "twist": "vx, vy and yaw_rate",
-        "position": "x and y",
-        "heading": "heading",
-        "pose": "x, y and heading",
-    }
+    casters = range(1, recording.steering.shape[1] + 1)
+    groups = {name: listed(f"{name}_{i}" for i in casters) for name in ("steering", "rolling")}
+    groups |= {"twist": "vx, vy and yaw_rate", "position": "x and y", "heading": "heading", "pose": "x, y and heading"}
     for name, columns in groups.items():
-        held = None if name in ("position", "heading") else getattr(recording, name)
-        if held is None and name not in ("position", "heading"):
+        field = "pose" if name in ("position", "heading") else name
+        if getattr(recording, field) is None:
             continue
         longest = min(_LONGEST_SHIFT, len(recording.pose) // 4)
         for rows in (*range(-longest, 0), *range(1, longest + 1)):
@@ -298,7 +259,7 @@ def _shifts(recording: Recording) -> Iterator[Mend]:
                 f"{columns} {verb} {way} {'late' if late else 'early'}",
                 f"move {columns} {moved} by {way} against the other columns",
                 lambda r, name=name, rows=rows: _shifted(r, name, rows),  # type: ignore[misc]
-                "pose" if name in ("position", "heading") else name,
+                field,
             )
 
 
@@ -313,23 +274,22 @@ def _shifted(recording: Recording, name: str, rows: int) -> Recording:
     return replace(cut, pose=np.column_stack([recording.pose[place, :2], recording.pose[turn, 2]]))
 
 
-def _scaled(recording: Recording, name: str, factors: dict[int, float]) -> Recording:
-    array = getattr(recording, name)
-    return replace(recording, **{name: array * np.array([factors.get(i, 1.0) for i in range(array.shape[1])])})
-
-
-_UNIT_WORDS = {"deg": "degrees", "rad": "radians"}
+def _scaled(name: str, wrong: str, advice: str, factors: dict[int, float]) -> Mend:
+    """Columns of casters (from 0), each times its factor."""
+    return _changed(
+        name, wrong, advice, lambda _, own: own * np.array([factors.get(i, 1.0) for i in range(own.shape[1])])
+    )
 
 
 def _in_header(columns: Sequence[str], unit: str) -> str:
     return f"write {listed(f'{column} [{unit}]' for column in columns)} into the header"
 
 
-def _have(which: Sequence[object]) -> str:
+def _have(which: Sized) -> str:
     return "have" if len(which) > 1 else "has"
 
 
-def _are(which: Sequence[object]) -> str:
+def _are(which: Sized) -> str:
     return "are" if len(which) > 1 else "is"
 
 

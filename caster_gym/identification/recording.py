@@ -85,10 +85,6 @@ class Recording:
         given = {name: change(name, columns) for name, columns in fields.items() if columns is not None}
         return replace(self, **given)  # type: ignore[arg-type]  # mypy does not follow names in a dict
 
-    def without_twist(self) -> "Recording":
-        """The same recording as a robot makes it that measures no velocities."""
-        return replace(self, twist=None)
-
     def noisy(self, noise: Noise, rng: np.random.Generator) -> "Recording":
         """The same recording with errors added to all that is measured; torques stay."""
         levels = np.array([getattr(noise, kind) or 0.0 for kind in self.kinds])
