@@ -11,13 +11,7 @@ from typing import Any
 
 from caster_gym.agents.control.computed_torque import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
-from caster_gym.agents.learning.settings import (
-    LearnerSettings,
-    PPOSettings,
-    RslPPOSettings,
-    SACSettings,
-    SHACSettings,
-)
+from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.own_code import OwnCode
 from caster_gym.paths.naming import unknown_name

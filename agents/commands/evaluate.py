@@ -24,11 +24,6 @@ def evaluate(policy: str, task: str | None, starts: int, out: Path, overwrite: b
         text = write_results(folder, compared, test, how.confidence, {}, words)
         model_based = {} if tuned is None else {"agent": tuned.model_dump(mode="json"), "source": tuned.source}
         write_provenance(
-            folder,
-            policy=policy,
-            **model_based,
-            task=settings.model_dump(mode="json"),
-            starts=starts,
-            threads=threads,
+            folder, policy=policy, **model_based, task=settings.model_dump(mode="json"), starts=starts, threads=threads
         )
     return text

@@ -138,11 +138,7 @@ def draw_obstacles(axis: "Axes", plan: Plan, path: int) -> None:
 
 
 def draw_speeds(
-    axis: "Axes",
-    episodes: Mapping[str, Episodes],
-    index: int,
-    colours: Mapping[str, str],
-    plan: Plan,
+    axis: "Axes", episodes: Mapping[str, Episodes], index: int, colours: Mapping[str, str], plan: Plan
 ) -> None:
     """Speed along the path in one episode over the way, beside that of the time law."""
     path = index % len(plan.names)

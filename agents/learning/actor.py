@@ -40,12 +40,7 @@ class LearnedAgent:
 
     def __init__(self, actor: Actor, name: str) -> None:
         self.actor = actor.eval()
-        self._name = name
-
-    @property
-    def name(self) -> str:
-        """Name of the algorithm, or what the bundle says."""
-        return self._name
+        self.name = name  # of the algorithm, or what the bundle says
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (robots, driven joints) for observations (robots, size)."""

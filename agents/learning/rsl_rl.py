@@ -66,11 +66,7 @@ def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> 
     """rsl-rl-lib's PPO with our settings, its networks begun as Stable-Baselines3 begins them."""
     torch.manual_seed(seed)
     network = {"class_name": "MLPModel", "hidden_dims": list(settings.net_arch), "activation": "relu"}
-    spread = {
-        "class_name": "GaussianDistribution",
-        "init_std": math.exp(settings.log_std_init),
-        "std_type": "log",
-    }
+    spread = {"class_name": "GaussianDistribution", "init_std": math.exp(settings.log_std_init), "std_type": "log"}
     configuration = {
         "num_steps_per_env": settings.n_steps,
         "check_for_nan": False,  # the robots' step never returns any, and to look would wait for the device

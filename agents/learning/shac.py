@@ -71,9 +71,8 @@ class ShortHorizon:
         self.actor = Actor(size, settings.net_arch, actions, "tanh").to(task.device, task.dtype)
         self.critic = Critic(size, settings.net_arch, settings.gamma).to(task.device, task.dtype)
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
-        self.actor_optimizer = torch.optim.Adam(
-            self.actor.parameters(), betas=MOMENTA, fused=True
-        )  # `improve` sets the rates
+        # `improve` sets the rates
+        self.actor_optimizer = torch.optim.Adam(self.actor.parameters(), betas=MOMENTA, fused=True)
         self.critic_optimizer = torch.optim.Adam(self.critic.parameters(), fused=True)
         keys = torch.randint(2**63 - 1, (settings.n_envs,), dtype=torch.int64).to(task.device)
         self.state, self.outcome = task.begin(keys)

@@ -2,6 +2,7 @@
 
 import reprlib
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -10,6 +11,17 @@ from caster_gym.mechanics.scalars import Direction, Vector, pairs
 from caster_gym.robot import Robot
 
 Numbers = TypeVar("Numbers")  # arrays of the engine
+
+
+def listed_robots(robots: Robot | Sequence[Robot], count: int | None) -> list[Robot]:
+    """One robot for all, or one for each, with the same number of casters."""
+    listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
+    if not listed or (count is not None and len(listed) != count):
+        raise ValueError(f"a batch needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
+    sizes = {robot.caster_count for robot in listed}
+    if len(sizes) > 1:
+        raise ValueError(f"all robots of a batch must have the same number of casters, got {sorted(sizes)}")
+    return listed
 
 
 class ModelInputs(ABC, Generic[Numbers]):

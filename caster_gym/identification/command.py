@@ -50,9 +50,8 @@ class IdentifySettings(Frozen):
 
     robot: str = "chung2008"  # name, or path of a YAML file: the robot as it is thought to be
     unknowns: tuple[str, ...] = PAYLOAD
-    start: dict[str, float] = Field(
-        default_factory=dict
-    )  # values that differ from the robot file's, also of a payload that is known
+    # values that differ from the robot file's, also of a payload that is known
+    start: dict[str, float] = Field(default_factory=dict)
     bounds: dict[str, tuple[float, float]] = Field(default_factory=dict)  # that differ from ours
     noise: Noise = Noise()  # standard deviations that are known; the others are estimated
     window: Positive = WINDOW  # [s] over which motions are predicted
@@ -147,11 +146,8 @@ def features_yaml(found: "Identification", recording: Path) -> str:
 
     A list, which may be empty, for `caster_gym.wrappers.read_features`; what no wrapper has is a comment.
     """
-    values = {
-        one.name: float(value)
-        for one, value, told in zip(found.unknowns, found.estimates, found.is_told, strict=True)
-        if told
-    }
+    told = zip(found.unknowns, found.estimates, found.is_told, strict=True)
+    values = {one.name: float(value) for one, value, is_told in told if is_told}
     count = found.robot.caster_count
     features: list[dict[str, Any]] = []
     if any(kind_of(name) == "steering_zero" for name in values):
@@ -166,25 +162,22 @@ def features_yaml(found: "Identification", recording: Path) -> str:
         **none,
         "torque_delay": "an action_delay of as many control periods comes nearest",
         "heading_zero": "subtract it from what the heading's sensor shows",
-        "vx_bias": "subtract it from what the sensor shows",
-        "vy_bias": "subtract it from what the sensor shows",
-        "yaw_rate_bias": "subtract it from what the sensor shows",
+        **dict.fromkeys(("vx_bias", "vy_bias", "yaw_rate_bias"), "subtract it from what the sensor shows"),
     }
-    comments = [
-        f"# {name}: {values[name]:.6g} {UNITS[name]}; {words}\n" for name, words in rest.items() if name in values
-    ]
+    notes = [f"# {name}: {values[name]:.6g} {UNITS[name]}; {words}\n" for name, words in rest.items() if name in values]
     header = (
         f"# Sensors and drives of {found.robot.name} as identified from {recording.name}: for caster_gym.wrappers.\n"
     )
-    return header + "".join(comments) + yaml.safe_dump(features, sort_keys=False, default_flow_style=None, width=110)
+    return header + "".join(notes) + yaml.safe_dump(features, sort_keys=False, default_flow_style=None, width=110)
 
 
 def in_words(found: "Identification") -> str:
     """The estimates, the unknowns that are not determined, warnings and notes."""
-    lines = []
-    for k, one in enumerate(found.unknowns):
-        if found.is_told[k]:
-            lines.append(f"{one.name} {number_words(found.estimates[k], found.half_widths[k])} {one.unit}")
+    lines = [
+        f"{one.name} {number_words(found.estimates[k], found.half_widths[k])} {one.unit}"
+        for k, one in enumerate(found.unknowns)
+        if found.is_told[k]
+    ]
     return "\n".join([*lines, *found.untold, *found.warnings, *found.notes])
 
 

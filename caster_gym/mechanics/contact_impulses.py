@@ -212,14 +212,7 @@ def press(
 
 
 def hold(
-    v: Vector,
-    state: State,
-    heading: Direction,
-    m: Symmetric,
-    hull: Hull,
-    obstacles: Obstacles,
-    first: Any,
-    end: Any,
+    v: Vector, state: State, heading: Direction, m: Symmetric, hull: Hull, obstacles: Obstacles, first: Any, end: Any
 ) -> tuple[Vector, Scalar]:
     """Impulses of lasting contacts on a robot that would else reach the twist v: wrench in B, and their normal sum.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeFloat, model_validator
@@ -21,6 +21,13 @@ Slopes: TypeAlias = tuple[Plane, Plane, Plane, Plane]  # a curve p and its first
 class _Kind(Frozen):
     """What all kinds of headings share."""
 
+    _angle: ClassVar[str] = "angle"  # the field that is given in rad or `unit`
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_radians(cls, content: Any) -> Any:
+        return read_angle(content, cls._angle)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was made of the numbers, in words."""
@@ -33,11 +40,7 @@ class Tangent(_Kind):
     kind: Literal["tangent"] = "tangent"
     offset: float = 0.0  # [rad] or `unit`, from the tangent to the body x-axis, counter-clockwise
     unit: AngleUnit | None = None  # of the offset
-
-    @model_validator(mode="before")
-    @classmethod
-    def _in_radians(cls, content: Any) -> Any:
-        return read_angle(content, "offset")
+    _angle = "offset"
 
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """Angle [rad] and its first two derivatives by the share of the path, 0 … 1, as the slopes are.
@@ -57,11 +60,6 @@ class Fixed(_Kind):
     angle: float = 0.0  # [rad] or `unit`
     unit: AngleUnit | None = None  # of the angle
 
-    @model_validator(mode="before")
-    @classmethod
-    def _in_radians(cls, content: Any) -> Any:
-        return read_angle(content, "angle")
-
     def turn(self, share: Array, slopes: Slopes) -> tuple[Array, Array, Array]:
         """As for Tangent."""
         return np.full_like(share, self.angle), np.zeros_like(share), np.zeros_like(share)
@@ -74,11 +72,6 @@ class Spinning(_Kind):
     turns: float = 1.0  # [rev] over the whole path, counter-clockwise
     angle: float = 0.0  # [rad] or `unit`, at the start
     unit: AngleUnit | None = None  # of the angle; turns are revolutions always
-
-    @model_validator(mode="before")
-    @classmethod
-    def _in_radians(cls, content: Any) -> Any:
-        return read_angle(content, "angle")
 
     @model_validator(mode="after")
     def _turns_are_no_degrees(self) -> Self:

@@ -91,9 +91,8 @@ class RandomPaths(Frozen):
         if self.min_radius is None:
             return turning
         angle, omega, alpha = turning
-        sharpest = np.max(
-            np.abs(omega[:, 1:-1]) / speed[:, 1:-1], axis=1, keepdims=True
-        )  # 1 / radius; ends are at rest
+        # 1 / radius; ends are at rest
+        sharpest = np.max(np.abs(omega[:, 1:-1]) / speed[:, 1:-1], axis=1, keepdims=True)
         gentler = 1.0 / np.maximum(self.min_radius * sharpest, 1.0)
         return angle[:, :1] + gentler * (angle - angle[:, :1]), gentler * omega, gentler * alpha
 

@@ -1,13 +1,16 @@
 """What all tasks have in common: time, corridor, starts, obstacles and costs."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, field_validator, model_validator
 
 from caster_gym.configuration import Frozen, Positive
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 from caster_gym.floor import Floor
+
+Horizons: TypeAlias = tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...]
+Turn: TypeAlias = Annotated[float, Field(ge=0.0, le=3.1416)]  # [rad] either way
 
 
 class TaskParameters(Frozen):
@@ -51,9 +54,9 @@ class TaskParameters(Frozen):
     substeps: Annotated[int, Field(gt=0, le=MOST_SUBSTEPS)] = 4  # RK4 steps in a control period
     corridor: Positive = 0.5  # [m] position error that ends an episode
     start_offset: NonNegativeFloat = 0.05  # [m] greatest start offset along each axis
-    start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.2  # [rad] greatest start heading error
+    start_turn: Turn = 0.2  # [rad] greatest start heading error
     touching: Literal["allowed", "ends"] = "allowed"  # what touching an obstacle means for the episode
-    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = ()  # horizons at which the reference is shown
+    preview: Horizons = ()  # horizons at which the reference is shown
     nearest: Annotated[int, Field(ge=0, le=16)] = 0  # obstacles that the observation shows
     floor: Literal["grip"] | Floor = "grip"  # or one of finite friction, on which wheels may slip
     effort_weight: NonNegativeFloat = 0.02

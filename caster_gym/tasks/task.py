@@ -62,12 +62,10 @@ class Task:
     preview_unit: Literal["s", "m"]  # of the horizons at which observations show the coming reference
 
     source: type[Any]  # type of the reference source, a named tuple; see `ReferenceSource`
-    lay_out: Callable[
-        [Robot, tuple[AnyPath, ...], Any], "tuple[ReferenceSource, list[Way]]"
-    ]  # from parameters; its weights are still to be filled in
-    fetch: Callable[
-        ..., Any
-    ]  # writes what a robot is to do next; see `caster_gym.envs.native.reference.fetch_reference`
+    # from parameters; its weights are still to be filled in
+    lay_out: Callable[[Robot, tuple[AnyPath, ...], Any], "tuple[ReferenceSource, list[Way]]"]
+    # writes what a robot is to do next; see `caster_gym.envs.native.reference.fetch_reference`
+    fetch: Callable[..., Any]
 
     weights: type[Any]  # type of the reward's numbers: a named tuple whose fields are those of the parameters
     terms: type[Any]  # type of the reward's terms: a named tuple

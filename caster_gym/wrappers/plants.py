@@ -69,10 +69,9 @@ OfAFloor: TypeAlias = Annotated[Range, AfterValidator(_of_a_floor)]
 class Friction(Feature):
     """Other friction in each joint, drawn joint by joint, and another floor.
 
-    >>> import gymnasium
+    >>> from caster_gym import CasterTrackEnv
     >>> from caster_gym.wrappers import Friction, wrap
-    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
-    >>> env = wrap(inner, Friction(added_coulomb=(0.0, 0.01)))
+    >>> env = wrap(CasterTrackEnv(path="lemniscate"), Friction(added_coulomb=(0.0, 0.01)))
     >>> observation, info = env.reset(seed=0)
     """
 
@@ -98,10 +97,9 @@ class Friction(Feature):
 class WheelErrors(Feature):
     """Casters whose trails and wheels differ from the description, drawn caster by caster.
 
-    >>> import gymnasium
+    >>> from caster_gym import CasterTrackEnv
     >>> from caster_gym.wrappers import WheelErrors, wrap
-    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
-    >>> env = wrap(inner, WheelErrors(radius=(-0.001, 0.001)))
+    >>> env = wrap(CasterTrackEnv(path="lemniscate"), WheelErrors(radius=(-0.001, 0.001)))
     >>> observation, info = env.reset(seed=0)
     """
 

@@ -18,10 +18,9 @@ class Pushes(Feature):
 
     The impulse of a push is its force times its duration. A push that begins during another one takes its place.
 
-    >>> import gymnasium
+    >>> from caster_gym import CasterTrackEnv
     >>> from caster_gym.wrappers import Pushes, wrap
-    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
-    >>> env = wrap(inner, Pushes(rate=1.0, force=(0.0, 5.0)))
+    >>> env = wrap(CasterTrackEnv(path="lemniscate"), Pushes(rate=1.0, force=(0.0, 5.0)))
     >>> observation, info = env.reset(seed=0)
     """
 

@@ -21,10 +21,9 @@ from caster_gym.wrappers.feature import Feature, Observations, Place, Quantities
 class SensorNoise(Feature):
     """Normal noise of every control period, and biases that stay for an episode; numbers are standard deviations.
 
-    >>> import gymnasium
+    >>> from caster_gym import CasterTrackEnv
     >>> from caster_gym.wrappers import SensorNoise, wrap
-    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
-    >>> env = wrap(inner, SensorNoise(position=0.002, heading=0.005))
+    >>> env = wrap(CasterTrackEnv(path="lemniscate"), SensorNoise(position=0.002, heading=0.005))
     >>> observation, info = env.reset(seed=0)
     """
 
@@ -48,10 +47,9 @@ class SensorNoise(Feature):
 class SteeringOffset(Feature):
     """Steering encoders that show every angle turned by a constant: known zeros, and what is drawn for each caster.
 
-    >>> import gymnasium
+    >>> from caster_gym import CasterTrackEnv
     >>> from caster_gym.wrappers import SteeringOffset, wrap
-    >>> inner = gymnasium.make("caster_gym:CasterTrack-v0", path="lemniscate")
-    >>> env = wrap(inner, SteeringOffset(angle=(-0.02, 0.02)))
+    >>> env = wrap(CasterTrackEnv(path="lemniscate"), SteeringOffset(angle=(-0.02, 0.02)))
     >>> observation, info = env.reset(seed=0)
     """
 

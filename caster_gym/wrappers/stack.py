@@ -91,9 +91,8 @@ class Stack:
             rows = np.repeat(self._nominal, len(robots), axis=0)
             for i, plant in self._plants:
                 rows = plant.rebuild(rows, self._coming[i, robots])
-            self._engine.set_parameters(
-                robots, rows, checked=True
-            )  # at the start; here it would take longer than steps
+            # checked at the start; here it would take longer than steps
+            self._engine.set_parameters(robots, rows, checked=True)
 
     def begin(self, robots: Indices, observations: Observations, infos: Mapping[str, Any]) -> Observations:
         """What some robots show after their reset; observations are theirs, infos those of all robots."""

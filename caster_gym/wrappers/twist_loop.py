@@ -12,7 +12,7 @@ motors cannot hold the command, c is the greatest multiple of it that they can h
 the wrench is that of the greatest part of the way towards it.
 """
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -25,23 +25,13 @@ from caster_gym.paths.trailing import steer
 from caster_gym.wrappers.feature import Actions, Place, Quantities
 from caster_gym.wrappers.inner_loop import InnerLoop
 
+if TYPE_CHECKING:
+    from caster_gym.wrappers.commands import TwistCommands
+
 _HALVINGS = 12  # of the interval in which the multiple of a command lies that the motors can hold: 0.02 %
 _HELD = 0.98  # [-] of the torques that holding a twist may take; the rest corrects errors
 _STUCK = 0.02  # [-] of the way, below which the motors do what they can, in whatever ratio, to get on
 _LEAST_TURN = 1e-6  # [rad] in a period, below which it does not matter how a command turns
-
-
-class Settings(Protocol):
-    """What the loop needs of its feature."""
-
-    @property
-    def frame(self) -> str: ...
-    @property
-    def max_speed(self) -> float: ...
-    @property
-    def max_yaw_rate(self) -> float: ...
-    @property
-    def bandwidth(self) -> float: ...
 
 
 class TwistLoop(InnerLoop):
@@ -49,7 +39,7 @@ class TwistLoop(InnerLoop):
 
     constants = InnerLoop.constants | {"_engine"}
 
-    def __init__(self, settings: Settings, place: Place) -> None:
+    def __init__(self, settings: "TwistCommands", place: Place) -> None:
         super().__init__(place, settings.bandwidth)
         self._engine, self._period = place.engine, place.period
         self._world = settings.frame == "world"

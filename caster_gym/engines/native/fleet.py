@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from caster_gym.arrays import Array
 from caster_gym.engines.memory import check_memory
+from caster_gym.engines.model_inputs import listed_robots
 from caster_gym.engines.native.compilation import Work
 from caster_gym.engines.native.compiler import INLINE, compiled
 from caster_gym.engines.native.fleet_rows import (
@@ -187,25 +188,19 @@ class Fleet:
         if isinstance(robots, Robot):
             n = robots.caster_count
             check_memory(count or 1, state_rows(n, False) + 2 * n + PLATFORM_FIELDS + CASTER_FIELDS * n)
-        listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
-        if not listed or (count is not None and len(listed) != count):
-            raise ValueError(f"a fleet needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
-        sizes = {robot.caster_count for robot in listed}
-        if len(sizes) > 1:
-            raise ValueError(f"all robots of a fleet must have the same number of casters, got {sorted(sizes)}")
-        self.robots = tuple(listed)
-        self.count = len(listed)
-        self._casters = tuple(range(sizes.pop()))
+        self.robots = tuple(listed_robots(robots, count))
+        self.count = len(self.robots)
+        self._casters = tuple(range(self.robots[0].caster_count))
         below = load_floor(floor)
         self._floor = None if below is None else floor_table(below)
         self._torque_row, self._room_row = torque_row(self._casters, self._floor), room_row(self._casters, self._floor)
         among = around is not None and len(around.obstacles.radii) > 0
         self._hull: Hull | None = around.hull if around is not None and among else None
         self._obstacles: Obstacles | None = around.obstacles if around is not None and among else None
-        self._distinct = list({id(robot): robot for robot in listed}.values())
+        self._distinct = list({id(robot): robot for robot in self.robots}.values())
         numbers = [parameters_on(robot, dynamics, below) for robot in self._distinct]
         packed = {id(robot): pack_parameters(one) for robot, one in zip(self._distinct, numbers, strict=True)}
-        parameters = np.array([packed[id(robot)] for robot in listed])
+        parameters = np.array([packed[id(robot)] for robot in self.robots])
         self._longest = float(longest_of_robots(self._distinct).min())
         first = parameter_row(self._casters, self._floor)
         self._blocks: Array = np.zeros((block_count(self.count), (first + parameters.shape[1]) * LANES))

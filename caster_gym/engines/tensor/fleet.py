@@ -7,12 +7,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from caster_gym.engines.model_inputs import listed_robots
 from caster_gym.engines.tensor.compiler import compiled, replayed
 from caster_gym.engines.tensor.scalars import (
     check_memory,
     checked_device,
     checked_dtype,
-    listed_robots,
     parameter_rows,
     parameters_of,
 )

@@ -65,17 +65,6 @@ def check_memory(robots: int, numbers: int, dtype: torch.dtype, device: torch.de
         )
 
 
-def listed_robots(robots: Robot | Sequence[Robot], count: int | None) -> list[Robot]:
-    """One robot for all, or one for each, with the same number of casters."""
-    listed = [robots] * (1 if count is None else count) if isinstance(robots, Robot) else list(robots)
-    if not listed or (count is not None and len(listed) != count):
-        raise ValueError(f"a batch needs one robot for all or {count or 'at least 1'} of them, got {len(listed)}")
-    sizes = {robot.caster_count for robot in listed}
-    if len(sizes) > 1:
-        raise ValueError(f"all robots of a batch must have the same number of casters, got {sorted(sizes)}")
-    return listed
-
-
 def parameter_rows(
     robots: Sequence[Robot], dtype: torch.dtype, device: torch.device, dynamics: Dynamics = "exact"
 ) -> Tensor:

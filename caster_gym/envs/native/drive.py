@@ -11,15 +11,7 @@ from numba.extending import register_jitable
 
 from caster_gym.engines.native.compiler import INLINE, compiled
 from caster_gym.engines.native.guarding import borrowed_hull, borrowed_obstacles, reach_of
-from caster_gym.engines.native.lanes import (
-    LANES,
-    read,
-    read_pairs,
-    read_robot,
-    read_slip_state,
-    read_state,
-    write,
-)
+from caster_gym.engines.native.lanes import LANES, read, read_pairs, read_robot, read_slip_state, read_state, write
 from caster_gym.envs.native.layout import CLOCKS, NO_WRENCH, Sizes, World, read_record, rows_of, write_record
 from caster_gym.envs.plan import BESIDE
 from caster_gym.envs.report import RECORD, record_of

@@ -10,8 +10,9 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from torch import Tensor
 
+from caster_gym.engines.model_inputs import listed_robots
 from caster_gym.engines.tensor.compiler import replayed
-from caster_gym.engines.tensor.scalars import check_memory, listed_robots, parameter_rows, parameters_of
+from caster_gym.engines.tensor.scalars import check_memory, parameter_rows, parameters_of
 from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, Seeds, check_counts, checked_seeds
 from caster_gym.envs.native.engine import DRAW_A_PATH
 from caster_gym.envs.spaces import action_space, observation_space

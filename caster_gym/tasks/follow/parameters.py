@@ -6,20 +6,16 @@ from pydantic import Field, NonNegativeFloat, model_validator
 
 from caster_gym.configuration import Positive
 from caster_gym.paths.trajectory import rounded_up
-from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.parameters import Horizons, TaskParameters, Turn
 
 
 class FollowParameters(TaskParameters):
     """How a path is to be followed at the robot's own pace, and how that is rewarded."""
 
-    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
-        0.05,
-        0.15,
-        0.4,
-    )  # [m] arc lengths ahead at which the path is shown
+    preview: Horizons = (0.05, 0.15, 0.4)  # [m] arc lengths ahead at which the path is shown
     corridor: Positive = 0.25  # [m] distance from the path that ends an episode
     start_offset: NonNegativeFloat = 0.02  # [m] greatest start offset along each axis
-    start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 0.1  # [rad] greatest start heading error
+    start_turn: Turn = 0.1  # [rad] greatest start heading error
     nearest: Annotated[int, Field(ge=0, le=16)] = 3  # obstacles that the observation shows
     speed_limit: Positive = 1.0  # [m/s] along the path; faster progress is worth no more
     margin: Annotated[float, Field(gt=0.0, le=1.0)] = 0.8  # share of the motors that the time law may use

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field, NonNegativeFloat
 
 from caster_gym.configuration import Positive
-from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.parameters import TaskParameters, Turn
 
 
 class HoldParameters(TaskParameters):
@@ -22,7 +22,7 @@ class HoldParameters(TaskParameters):
     duration: Annotated[float, Field(gt=0.0, le=3600.0)] = 4.0  # [s] of an episode
     corridor: Positive = 1.0  # [m] distance from the pose that ends an episode
     start_offset: NonNegativeFloat = 0.3  # [m] greatest start offset along each axis of the pose
-    start_turn: Annotated[float, Field(ge=0.0, le=3.1416)] = 1.0  # [rad] greatest start heading error
+    start_turn: Turn = 1.0  # [rad] greatest start heading error
     position_weight: NonNegativeFloat = 0.4
     heading_weight: NonNegativeFloat = 0.3
     rest_weight: NonNegativeFloat = 0.3

@@ -1,21 +1,17 @@
 """The parameters of the tracking task."""
 
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import Field, NonNegativeFloat, model_validator
+from pydantic import NonNegativeFloat, model_validator
 
 from caster_gym.configuration import Positive
-from caster_gym.tasks.parameters import TaskParameters
+from caster_gym.tasks.parameters import Horizons, TaskParameters
 
 
 class TrackParameters(TaskParameters):
     """How a timed trajectory is to be followed, and how that is rewarded."""
 
-    preview: tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...] = (
-        0.1,
-        0.2,
-        0.4,
-    )  # [s] horizons at which the coming trajectory is shown
+    preview: Horizons = (0.1, 0.2, 0.4)  # [s] horizons at which the coming trajectory is shown
     position_weight: NonNegativeFloat = 0.5
     heading_weight: NonNegativeFloat = 0.3
     speed_weight: NonNegativeFloat = 0.2
