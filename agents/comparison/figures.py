@@ -111,13 +111,10 @@ def draw_path(
     axis.plot(*table[0, :2], "o", color="black", markersize=5)
     low, high = table[:, :2].min(axis=0), table[:, :2].max(axis=0)
     centre, reach = 0.5 * (low + high), pictures.around + 0.6 * float((high - low).max())
-    axis.set_xlim(centre[0] - reach, centre[0] + reach)
-    axis.set_ylim(centre[1] - reach, centre[1] + reach)
-    axis.set_aspect("equal")
+    axis.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axis.set(xlim=(centre[0] - reach, centre[0] + reach), ylim=(centre[1] - reach, centre[1] + reach))
     remark = "" if larger == 1.0 else f", errors × {larger:g} after {TRANSIENT:g} s"
     axis.set_title(f"{first.names[index]}{remark}", fontsize="medium")
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
 
 
 def draw_obstacles(axis: "Axes", plan: Plan, path: int) -> None:
@@ -149,8 +146,7 @@ def draw_speeds(
         progress = series.progress[:, index]
         axis.plot(progress[1:], np.diff(progress) / series.period, color=colours[agent], linewidth=1.2, label=agent)
     axis.set_title(next(iter(episodes.values())).names[index], fontsize="medium")
-    axis.set_xlabel("progress [m]")
-    axis.set_ylabel("speed along the path [m/s]")
+    axis.set(xlabel="progress [m]", ylabel="speed along the path [m/s]")
 
 
 def draw_errors(
@@ -164,8 +160,7 @@ def draw_errors(
         low, middle, high = np.nanquantile(size, [0.1, 0.5, 0.9], axis=1)
         axis.fill_between(time, low, high, color=colours[agent], alpha=0.2, linewidth=0)
         axis.plot(time, middle, color=colours[agent], label=agent)
-    axis.set_yscale("log")
-    axis.set_ylabel(label)
+    axis.set(yscale="log", ylabel=label)
 
 
 def draw_torques(axis: "Axes", series: Episodes, index: int) -> None:
@@ -192,9 +187,8 @@ def draw_learning(axis: "Axes", histories: Mapping[str, Sequence[Validation]], n
         values = how.factor * np.array([getattr(one.verdict, name) for one in history])
         values = np.where(np.isfinite(values), values, np.nan)
         axis.plot(seconds, values, ".-", color=COLOURS[i % len(COLOURS)], label=run)
-    axis.set_yscale(how.scale)
-    axis.set_xlabel("training time [s], one core for each seed")
-    axis.set_ylabel(f"validation {how.label}")
+    label = f"validation {how.label}"
+    axis.set(yscale=how.scale, xlabel="training time [s], one core for each seed", ylabel=label)
     axis.legend(fontsize="small")
 
 

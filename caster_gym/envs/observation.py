@@ -269,19 +269,14 @@ class ObservationLayout:
     def __init__(
         self, robot: Robot, preview: tuple[float, ...], unit: Literal["s", "m"] = "s", nearest: int = 0
     ) -> None:
-        self.robot = robot
-        self.preview = preview
-        self.unit = unit
-        self.nearest = nearest
+        self.robot, self.preview, self.unit, self.nearest = robot, preview, unit, nearest
         self._parts: dict[str, Part] = {}
         points = [{"ahead": f"{ahead:g}{unit}", "ahead_in_words": f"{ahead:g} {unit}"} for ahead in preview]
         neighbours = [{"number": str(k + 1), "nearer": str(k)} for k in range(nearest)]
         for channel in CHANNELS:
-            scale = list(channel.units)
-            if channel.per == "caster":
-                scale = scale * robot.caster_count
-                levers = [getattr(caster, lever) for caster in robot.casters for lever in channel.levers]
-                scale = [size / lever for size, lever in zip(scale, levers, strict=True)] if levers else scale
+            scale = list(channel.units) * (robot.caster_count if channel.per == "caster" else 1)
+            levers = [getattr(caster, lever) for caster in robot.casters for lever in channel.levers]
+            scale = [size / lever for size, lever in zip(scale, levers, strict=True)] if levers else scale
             items = {"point": points, "obstacle": neighbours}
             for words in items.get(channel.per, [{}]):
                 self._add(channel.name.format(**words), scale, channel.meaning.format(**words))
