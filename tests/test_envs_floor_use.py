@@ -51,9 +51,8 @@ def asked(robot, state, action, wrench):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("height", [0.0, 0.04])
-def test_traction_use_is_the_greatest_within_the_period_under_whatever_pushes(height):
-    robot = standing_high(random_robot(301, 3), height)
+def test_traction_use_is_the_greatest_within_the_period_under_whatever_pushes():
+    robot = standing_high(random_robot(301, 3), 0.04)
     env = CasterTrackEnv(robot, PATH, corridor=50.0)
     env.reset(seed=1)
     rng, model, h = np.random.default_rng(2), Model(robot), env.task.time_step

@@ -200,7 +200,9 @@ def still(count=60):
     )
 
 
-@pytest.mark.parametrize("recording", [still(), noisy(still(), 0)], ids=["exact", "noisy"])
+@pytest.mark.parametrize(
+    "recording", [still(), pytest.param(noisy(still(), 0), marks=pytest.mark.slow)], ids=["exact", "noisy"]
+)
 def test_a_robot_that_stands_still_tells_nothing(recording):
     names = (*LOAD, "scrub")
     found = identify(CHUNG, recording, names, window=WINDOW)

@@ -112,7 +112,9 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize(("name", "with_noise"), [("chung2008", True), ("tidybot2", False)])
+@pytest.mark.parametrize(
+    ("name", "with_noise"), [("chung2008", True), pytest.param("tidybot2", False, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("words", MISTAKES)
 def test_a_mistake_is_named_and_its_mend_is_accepted(drives, name, words, with_noise):
     robot, recording = ROBOTS[name], drives[name]

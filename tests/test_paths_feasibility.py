@@ -113,7 +113,9 @@ def use_at(path, factor, steps_per_second, robot):
     return motor_use(slower.trajectories(slower.duration / steps), robot).use.max()
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    "name", ["chung2008", *(pytest.param(one, marks=pytest.mark.slow) for one in ("tidybot2", "xr4000"))]
+)
 @pytest.mark.parametrize("what", PATHS)
 def test_the_shortest_time_for_a_path_is_the_same_for_coarse_and_fine_samples(what, name):
     """At 20 ms and at 1 ms, on casters with trails of 14 to 20 mm, which pivots pass by far in 20 ms.

@@ -14,7 +14,6 @@ from caster_gym import Model, load_robot
 from caster_gym.paths.course import build_courses
 from caster_gym.paths.feasibility import motor_use
 from caster_gym.robot import Robot
-from caster_gym.shipped_files import names_of
 
 ROBOT = load_robot("chung2008")
 MARGIN = 0.8
@@ -159,7 +158,9 @@ def with_friction(name, factor):
     return Robot(**content)
 
 
-@pytest.mark.parametrize("name", names_of("robots"))
+@pytest.mark.parametrize(
+    "name", ["chung2008", *(pytest.param(one, marks=pytest.mark.slow) for one in ("tidybot2", "xr4000"))]
+)
 @pytest.mark.parametrize("shape", ["circle", "ellipse", "lemniscate", "rounded_square"])
 @pytest.mark.parametrize("margin", [0.3, 0.8, 1.0])
 def test_no_motor_is_used_beyond_the_margin_and_one_is_used_to_it(name, shape, margin):

@@ -78,12 +78,15 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import gymnasium as gym
 import numpy as np
+from caster_gym import load_robot
 from caster_gym.tasks.registry import register_environments
 
 register_environments("own_slow:TASK")
-env = gym.make("CasterSlow-v0", path="circle")
+robot = load_robot("chung2008")
+pair = robot.model_copy(update={"casters": robot.casters[:2], "actuation": "all"})  # for speed
+env = gym.make("CasterSlow-v0", robot=pair, path={"shape": "circle", "duration": 60.0}, preview=())
 env.reset(seed=0)
-_, reward, _, _, info = env.step(np.zeros(6, dtype=np.float32))
+_, reward, _, _, info = env.step(np.zeros(4, dtype=np.float32))
 assert reward == info["reward_terms"]["slowness"] + 1.0
 print(info["reward_terms"]["slowness"])
 """

@@ -246,7 +246,9 @@ def track(env, actions, steps):
     return np.array(poses), shown_twist(env, observations)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot", ["chung2008", *(pytest.param(one, marks=pytest.mark.slow) for one in ("tidybot2", "xr4000"))]
+)
 @pytest.mark.parametrize("bandwidth", [20.0, *(pytest.param(one, marks=pytest.mark.slow) for one in (2.0, 1000.0))])
 @pytest.mark.parametrize("frame", ["world", "body"])
 def test_a_turning_robot_goes_where_commands_point(robot, bandwidth, frame):
