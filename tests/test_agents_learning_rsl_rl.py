@@ -160,3 +160,17 @@ def test_a_missing_library_is_named(monkeypatch):
     monkeypatch.delitem(sys.modules, "caster_gym.agents.learning.rsl_rl")
     with pytest.raises(DependencyNotInstalled, match=r"pip install 'caster_gym\[gpu\]'"):
         importlib.import_module("caster_gym.agents.learning.rsl_rl")
+
+
+def test_a_fresh_batch_goes_on_from_a_state():
+    batch, other = (RslVecEnv(TorchVectorEnv("track", COUNT, max_episode_steps=LONGEST, **QUICK), s) for s in (1, 2))
+    actions = 2.0 * torch.rand((3 * LONGEST, COUNT, 6), generator=torch.Generator().manual_seed(4)) - 1.0
+    for one in actions[:2]:
+        batch.step(one)
+    other.set_state(batch.get_state())
+    assert torch.equal(other.get_observations()["policy"], batch.get_observations()["policy"])
+    for one in actions[2:]:
+        ours, theirs = other.step(one), batch.step(one)
+        assert torch.equal(ours[0]["policy"], theirs[0]["policy"])
+        assert all(torch.equal(mine, expected) for mine, expected in zip(ours[1:3], theirs[1:3], strict=True))
+        assert torch.equal(other.episode_length_buf, batch.episode_length_buf)

@@ -266,3 +266,28 @@ def test_sb3_films_all_robots_or_their_grid():
         assert all(image.shape == images[0].shape for image in images)
         assert_array_equal(env.render("rgb_array"), tile_images(images))
     assert native().get_images() == [None] * COUNT
+
+
+def test_a_fresh_batch_goes_on_from_a_state():
+    batch, other = native(), native()
+    batch.seed(3)
+    pending = batch.get_state()  # with seeds for the coming reset
+    first = batch.reset()
+    other.set_state(pending)
+    assert_array_equal(other.reset(), first)
+    rng = np.random.default_rng(1)
+    actions = rng.uniform(-1.0, 1.0, (3 * LONGEST, COUNT, 6)).astype(np.float32)
+    for one in actions[:20]:
+        batch.step(one)
+    other.set_state(batch.get_state())
+    ended = 0
+    for one in actions[20:]:
+        ours, theirs = other.step(one), batch.step(one)
+        for mine, expected in zip(ours[:3], theirs[:3], strict=True):
+            assert_array_equal(mine, expected)
+        assert [info.get("episode") for info in ours[3]] == [info.get("episode") for info in theirs[3]]
+        ended += int(theirs[2].sum())
+    assert ended > COUNT
+    assert_array_equal(other.action_space.sample(), batch.action_space.sample())
+    with pytest.raises(ValueError, match="the batch for SB3 lacks 'lengths'"):
+        other.set_state({name: array for name, array in batch.get_state().items() if name != "lengths"})

@@ -192,7 +192,7 @@ def test_a_state_of_another_batch_is_refused(other, message):
         ({"done": np.zeros(4, np.bool_)}, r"'done' .* must be an array of bool of shape \(5,\), got .* \(4,\)"),
         ({"engine/blocks": np.zeros((1, 8))}, "'blocks' in the state of the robots must be an array of float64"),
         ({"engine/seeds": np.zeros((2, 5))}, "'seeds' in the state of the robots must be .* uint64 .* got .* float64"),
-        ({"engine/clocks": np.full((2, 5), 7)}, "paths in 0 … 1, got 7 … 7 and 7 … 7"),
+        ({"engine/clocks": np.full((2, 5), 7)}, "paths in 0 … 1, got clocks from 7 and paths in 7 … 7"),
         ({"made_of": np.zeros(3, np.uint8)}, "its description is None"),
     ],
 )

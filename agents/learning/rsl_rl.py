@@ -15,6 +15,7 @@ from caster_gym.agents.learning.tensors import torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.envs.plan import SPAN
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
+from caster_gym.states import AnyState, State, check_state, join_states, part_of, without
 
 try:
     from rsl_rl.env import VecEnv
@@ -60,6 +61,18 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
         self._lengths = torch.where(ended, 0, self._lengths + 1)
         log = {"/position_error": infos["position_error"]}
         return self.get_observations(), rewards, ended.long(), {"time_outs": truncated & ~terminated, "log": log}
+
+    def get_state(self) -> State:
+        """Copies of all that the batch goes on from, on the CPU, as a flat dictionary of arrays."""
+        own = {"lengths": self._lengths.cpu().numpy().copy(), "seen": self._seen.cpu().numpy().copy()}
+        return own | join_states(batch=self.batch.get_state())
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on as the batch did whose `get_state` gave the state; see `TorchVectorEnv.set_state`."""
+        check_state("the batch for rsl-rl-lib", without(state, "batch"), without(self.get_state(), "batch"))
+        self.batch.set_state(part_of(state, "batch"))
+        self._lengths = torch.tensor(state["lengths"], device=self.device)
+        self._seen = torch.tensor(state["seen"], device=self.device)
 
 
 def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> OnPolicyRunner:

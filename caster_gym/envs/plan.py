@@ -70,6 +70,14 @@ class Plan(NamedTuple):
     arenas: NDArray[np.int64]  # (paths, 2) as in `Beside`
     descriptions: tuple[str, ...]  # what was made of each path
 
+    def check_clocks(self, clocks: NDArray[np.int64], paths: NDArray[np.int64]) -> None:
+        """Raise ValueError for control periods (robots,) and indices of paths (robots,) that cannot be."""
+        if clocks.min() < 0 or paths.min() < 0 or paths.max() >= len(self.names):
+            raise ValueError(
+                f"a state must hold clocks of 0 or more and paths in 0 … {len(self.names) - 1}, "
+                f"got clocks from {clocks.min()} and paths in {paths.min()} … {paths.max()}"
+            )
+
     def __deepcopy__(self, _memo: dict[int, Any]) -> Self:
         """Itself: nobody writes into its tables, which the environments of a process share."""
         return self

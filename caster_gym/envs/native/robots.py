@@ -147,12 +147,7 @@ class Robots:
             "reports": np.broadcast_to(0.0, (self.report_rows, self.count)),
         }
         check_state("the robots", state, expected, ("parameters", "late", "reports"))
-        clocks, paths = state["clocks"]
-        if clocks.min() < 0 or paths.min() < 0 or paths.max() >= len(self.plan.names):
-            raise ValueError(
-                f"'clocks' in the state of the robots must hold control periods of 0 or more and paths in "
-                f"0 … {len(self.plan.names) - 1}, got {clocks.min()} … {clocks.max()} and {paths.min()} … {paths.max()}"
-            )
+        self.plan.check_clocks(*state["clocks"])
 
     def set_state(self, state: AnyState) -> None:
         """Go on from a state that `get_state` gave and `check_state` has seen. Arrays are copied."""

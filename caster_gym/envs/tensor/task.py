@@ -7,7 +7,9 @@ Nothing waits for the device where there are no obstacles, and nothing is writte
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from caster_gym.engines.tensor.compiler import compiled
@@ -15,16 +17,19 @@ from caster_gym.engines.tensor.motion import torch_floor
 from caster_gym.engines.tensor.scalars import check_memory, checked_device, checked_dtype
 from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, check_counts
 from caster_gym.envs.native.engine import DRAW_A_PATH
+from caster_gym.envs.specification import describe_environment
 from caster_gym.envs.starts import DRAWN, Start, check_free
 from caster_gym.envs.tensor.drive import TorchDrive
 from caster_gym.envs.tensor.look import TorchLook
 from caster_gym.envs.tensor.obstacles import torch_surroundings
 from caster_gym.envs.tensor.reference import torch_source
+from caster_gym.envs.tensor.saved import check_arrays, state_arrays, tensors_of
 from caster_gym.envs.tensor.starts import BEFORE_START, TorchStarts
 from caster_gym.envs.tensor.state import Given, TaskOutcome, TaskState, empty_record
 from caster_gym.mechanics.integration import state_rows
 from caster_gym.mechanics.parameters import RobotParameters, robot_parameters
 from caster_gym.paths.specification import PathLike
+from caster_gym.states import AnyState, State, check_description, without
 
 if TYPE_CHECKING:
     from caster_gym.tasks.task import Task
@@ -164,6 +169,25 @@ class TorchTask:
             observations=torch.where(again, first.observations.T, outcome.observations.T).T,
             report=torch.where(again, first.report, outcome.report),
         )
+
+    def to_arrays(self, state: TaskState, outcome: TaskOutcome) -> State:
+        """Copies of a state and an outcome on the CPU, as a flat dictionary of arrays; see `from_arrays`."""
+        return {"made_of": self._made_of} | state_arrays(state, outcome)
+
+    def from_arrays(self, arrays: AnyState) -> tuple[TaskState, TaskOutcome]:
+        """The state and outcome that `to_arrays` gave, also in another process: robots go on from them, bit for bit.
+
+        They have no past, through which gradients pass, and `parameters` is not part of them. Raises ValueError for
+        arrays of another task.
+        """
+        check_description(arrays, self._made_of)
+        own = without(arrays, "made_of")
+        check_arrays(self.engine, self.dtype, own, len(own.get("clocks", ())))
+        return tensors_of(own, self.device)
+
+    @property
+    def _made_of(self) -> NDArray[np.uint8]:
+        return describe_environment(self.task, self.engine, dtype=str(self.dtype), diagnostics=self.diagnostics)
 
     def info(self, report: Tensor) -> dict[str, Any]:
         """Named quantities of all robots, as `CasterTrackEnv` describes them: tensors with robots in front."""

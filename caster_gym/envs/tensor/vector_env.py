@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
 from torch import Tensor
 
 from caster_gym.engines.model_inputs import listed_robots
@@ -16,12 +17,25 @@ from caster_gym.engines.tensor.scalars import check_memory, parameter_rows, para
 from caster_gym.envs.inputs import Actuation, ArenaLike, RobotLike, Seeds, check_counts, checked_seeds
 from caster_gym.envs.native.engine import DRAW_A_PATH
 from caster_gym.envs.spaces import action_space, observation_space
+from caster_gym.envs.specification import describe_environment
 from caster_gym.envs.starts import read_options, read_start
+from caster_gym.envs.tensor.saved import check_arrays, parameter_array, parameters_from, state_arrays, tensors_of
 from caster_gym.envs.tensor.state import TaskOutcome, TaskState
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.paths.specification import PathLike
 from caster_gym.robot import Robot
+from caster_gym.states import (
+    AnyState,
+    State,
+    check_description,
+    check_state,
+    generator_words,
+    join_states,
+    part_of,
+    set_generator,
+    without,
+)
 
 if TYPE_CHECKING:
     from caster_gym.tasks.task import Task
@@ -142,6 +156,41 @@ class TorchVectorEnv:
             "_final_obs": final.ended,
         }
         return outcome.observations, outcome.rewards, outcome.terminated, outcome.truncated, infos
+
+    def get_state(self) -> State:
+        """Copies of all that the batch goes on from, on the CPU, as a flat dictionary of arrays; see `set_state`."""
+        own: State = {
+            "made_of": self._made_of,
+            "parameters": parameter_array(self.task.parameters),
+            "action_space": generator_words(self.single_action_space.np_random),
+        }
+        return own if self._now is None else own | join_states(robots=state_arrays(*self._now))
+
+    def set_state(self, state: AnyState) -> None:
+        """Go on, to the last bit, as the batch did whose `get_state` gave the state: also in another process.
+
+        That holds on a device of the same kind, compiled if the other one was. The arrays are copied. Raises
+        ValueError, with nothing changed, for a state of a batch that was made in another way.
+        """
+        check_description(state, self._made_of)
+        own, robots = without(state, "made_of", "robots"), part_of(state, "robots")
+        fields = len(pack_parameters(robot_parameters(self.robot)))
+        expected = {"parameters": np.zeros((self.num_envs, fields)), "action_space": np.zeros(6, dtype=np.uint64)}
+        check_state("the batch", own, expected, ("parameters",))
+        if robots:
+            check_arrays(self.task.engine, self.dtype, robots, self.num_envs)
+        self._now = tensors_of(robots, self.device) if robots else None
+        rows = own["parameters"]
+        self.task.parameters = (
+            parameters_from(rows, self.dtype, self.device) if rows.size else robot_parameters(self.robot)
+        )
+        set_generator(self.single_action_space.np_random, own["action_space"])
+
+    @property
+    def _made_of(self) -> NDArray[np.uint8]:
+        """What tells the batch from others."""
+        kind = {"number of robots": self.num_envs, "dtype": str(self.dtype), "diagnostics": self.task.diagnostics}
+        return describe_environment(self.task.task, self.task.engine, **kind)
 
     @property
     def states(self) -> Tensor:
