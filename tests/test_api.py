@@ -139,6 +139,12 @@ def test_the_page_lists_every_name_once():
     assert sorted(re.findall(r"^\| `([\w.]+)` \| .+ \|$", page, re.M)) == NAMES
 
 
+def test_the_example_of_a_saved_state_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"^```python\n(.+?)^```$", (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.M | re.S)
+    exec(compile(code, "docs/api.md", "exec"), {})
+
+
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_pages_import_from_nowhere_deeper(page):
     """Modules may move; these names stay. A page that means a file writes its path."""

@@ -1,8 +1,6 @@
 """caster_gym.states: an environment whose state is set goes on as the other one would have, to the last bit."""
 
 import copy
-import subprocess
-import sys
 from typing import Any
 
 import gymnasium as gym
@@ -137,28 +135,6 @@ def test_one_robot_goes_on_from_a_state_also_with_gymnasiums_wrappers():
     assert other.unwrapped.np_random_seed == 2**130
     assert other.unwrapped.np_random.uniform() == env.np_random.uniform()
     assert_array_equal(other.unwrapped.action_space.sample(), env.action_space.sample())
-
-
-CHILD = """
-import sys, numpy as np
-from tests.test_states import go_on, make
-env = make()
-env.set_state(dict(np.load(sys.argv[1])))
-brought = go_on(env, 2, 60)
-np.savez(sys.argv[2], observations=np.stack([step[0] for step in brought]), rewards=np.stack([s[1] for s in brought]))
-"""
-
-
-@pytest.mark.slow
-def test_another_process_goes_on_from_a_state(tmp_path):
-    env = make()
-    env.reset(seed=3)
-    go_on(env, 1, BEFORE)
-    np.savez(tmp_path / "state.npz", **env.get_state())
-    subprocess.run([sys.executable, "-c", CHILD, tmp_path / "state.npz", tmp_path / "brought.npz"], check=True)
-    expected, brought = go_on(env, 2, AFTER), np.load(tmp_path / "brought.npz")
-    assert_array_equal(brought["observations"], np.stack([step[0] for step in expected]))
-    assert_array_equal(brought["rewards"], np.stack([step[1] for step in expected]))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 """caster_gym.wrappers.memory: what features remember is saved and comes back, whatever they are."""
 
 import copy
+import subprocess
+import sys
 from collections import deque
 from typing import Any, ClassVar, get_args
 
@@ -87,6 +89,30 @@ def test_fresh_features_go_on_from_a_state(kinds, mode):
     assert_same(go_on(other, 2, AFTER), expected)
     assert ends(expected) >= 2
     assert_array_equal(other.action_space.sample(), env.action_space.sample())
+
+
+CHILD = """
+import sys, numpy as np
+from gymnasium.vector import AutoresetMode
+from tests.test_states import go_on
+from tests.test_wrappers_memory import TOGETHER, made
+env = made(TOGETHER[1], AutoresetMode.SAME_STEP)
+env.set_state(dict(np.load(sys.argv[1])))
+brought = go_on(env, 2, 60)
+np.savez(sys.argv[2], observations=np.stack([step[0] for step in brought]), rewards=np.stack([s[1] for s in brought]))
+"""
+
+
+@pytest.mark.slow
+def test_another_process_goes_on_from_a_state(tmp_path):
+    env = made(TOGETHER[1], AutoresetMode.SAME_STEP)
+    env.reset(seed=3)
+    go_on(env, 1, BEFORE)
+    np.savez(tmp_path / "state.npz", **env.get_state())
+    subprocess.run([sys.executable, "-c", CHILD, tmp_path / "state.npz", tmp_path / "brought.npz"], check=True)
+    expected, brought = go_on(env, 2, AFTER), np.load(tmp_path / "brought.npz")
+    assert_array_equal(brought["observations"], np.stack([step[0] for step in expected]))
+    assert_array_equal(brought["rewards"], np.stack([step[1] for step in expected]))
 
 
 def test_features_of_another_kind_order_or_setting_are_refused():

@@ -28,6 +28,7 @@ from caster_gym.states import (
     without,
 )
 from caster_gym.wrappers.feature import Actions, Feature, Observations
+from caster_gym.wrappers.infos import batch_of_one, last, tell
 from caster_gym.wrappers.plants import WheelErrors
 from caster_gym.wrappers.specification import read_features
 from caster_gym.wrappers.stack import Stack
@@ -59,18 +60,18 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     ) -> tuple[Observations, dict[str, Any]]:
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
-        shown = self._stack.begin(_ONLY, observation[None], _batch_of_one(info))[0]
-        _tell(info, 0.0, dict.fromkeys(self._stack.terms, 0.0))
+        shown = self._stack.begin(_ONLY, observation[None], batch_of_one(info))[0]
+        tell(info, 0.0, dict.fromkeys(self._stack.terms, 0.0))
         return shown, info
 
     def step(self, action: Actions) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control period. Raises ValueError for a wrong shape or a value that is not a number."""
         given = _checked_actions(action, self.action_space, "action")
         observation, task_reward, terminated, truncated, info = self.env.step(self._stack.act(given[None])[0])
-        terms = self._stack.score(_batch_of_one(info), {}, _RUNNING, np.array([terminated]))
+        terms = self._stack.score(batch_of_one(info), {}, _RUNNING, np.array([terminated]))
         numbers = {name: float(term[0]) for name, term in terms.items()}
         reward = float(task_reward)
-        _tell(info, reward, numbers)
+        tell(info, reward, numbers)
         for number in numbers.values():
             reward += number
         return self._stack.observe(observation[None])[0], reward, terminated, truncated, info
@@ -146,7 +147,7 @@ class FeatureVectorEnv(AnyVectorWrapper):
         self._begin(mask, observations, infos)
         self._ended = self._ended & ~mask
         nothing = np.zeros(self.num_envs)
-        _tell(infos, nothing, {name: nothing.copy() for name in self._stack.terms}, mask)
+        tell(infos, nothing, {name: nothing.copy() for name in self._stack.terms}, mask)
         return self._shown.copy(), infos
 
     def step(self, actions: Actions) -> tuple[Observations, Array, Flags, Flags, dict[str, Any]]:
@@ -157,7 +158,7 @@ class FeatureVectorEnv(AnyVectorWrapper):
         at_once = self.autoreset_mode is AutoresetMode.SAME_STEP
         fresh = self._ended if at_once else ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
         terms = self._stack.score(infos, infos.get("final_info", {}), fresh, terminated)
-        self._shown = self._stack.observe(_last(observations, infos))
+        self._shown = self._stack.observe(last(observations, infos))
         if not at_once:  # the step of fresh robots was their reset
             terms = {name: np.where(fresh, 0.0, term) for name, term in terms.items()}
         rewards = task_rewards.copy()
@@ -169,7 +170,7 @@ class FeatureVectorEnv(AnyVectorWrapper):
             self._begin(fresh, observations, infos)
         going_on = {name: np.where(fresh, 0.0, term) for name, term in terms.items()}
         everyone = np.ones(self.num_envs, dtype=np.bool_)
-        _tell(infos, np.where(fresh, 0.0, task_rewards), going_on, everyone)
+        tell(infos, np.where(fresh, 0.0, task_rewards), going_on, everyone)
         return self._shown.copy(), rewards, terminated, truncated, infos
 
     def get_state(self) -> State:
@@ -217,7 +218,7 @@ class FeatureVectorEnv(AnyVectorWrapper):
         for robot in np.flatnonzero(ended):
             infos["final_obs"][robot] = self._shown[robot].copy()
         lasts = {name: np.where(ended, term, 0.0) for name, term in terms.items()}
-        _tell(infos["final_info"], np.where(ended, task_rewards, 0.0), lasts, ended)
+        tell(infos["final_info"], np.where(ended, task_rewards, 0.0), lasts, ended)
 
 
 @overload
@@ -304,26 +305,3 @@ def _checked_actions(actions: Any, space: Any, name: str = "actions") -> NDArray
             f"{name} must hold numbers, got {given[np.isnan(given).any(axis=-1)] if given.ndim > 1 else given}"
         )
     return given
-
-
-def _last(observations: Observations, infos: dict[str, Any]) -> Observations:
-    """What the environment showed at the end of the step, before any reset."""
-    if "final_obs" not in infos:
-        return observations
-    last, ended = observations.copy(), infos["_final_obs"]
-    last[ended] = np.stack(list(infos["final_obs"][ended]))
-    return last
-
-
-def _batch_of_one(info: dict[str, Any]) -> dict[str, Any]:
-    """Info of one robot as that of a batch; reward terms as they are."""
-    return {key: value if isinstance(value, dict) else np.asarray(value)[None] for key, value in info.items()}
-
-
-def _tell(infos: dict[str, Any], task_reward: Any, terms: dict[str, Any], mask: Flags | None = None) -> None:
-    """Put the task's reward and the added terms into infos, with masks if they are those of a batch."""
-    infos["task_reward"] = task_reward
-    infos["reward_terms"].update(terms)
-    if mask is not None:
-        infos["_task_reward"] = mask.copy()
-        infos["reward_terms"].update({f"_{name}": mask.copy() for name in terms})

@@ -119,6 +119,12 @@ class CasterTrackVectorEnv(TaskVectorEnv):
     >>> observations, rewards, terminated, truncated, infos = batch.step(batch.action_space.sample())
     >>> observations in batch.observation_space, rewards.shape, infos["position_error"].shape
     (True, (16,), (16,))
+    >>> state = batch.get_state()  # arrays, from which another batch goes on
+    >>> other = gymnasium.make_vec("caster_gym:CasterTrack-v0", num_envs=16, path="lemniscate")
+    >>> other.set_state(state)
+    >>> actions = batch.action_space.sample()
+    >>> bool((other.step(actions)[0] == batch.step(actions)[0]).all())
+    True
     """
 
     definition = TASK
