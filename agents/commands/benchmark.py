@@ -24,6 +24,7 @@ from caster_gym.file_names import NameOrFile
 from caster_gym.report.provenance import write_provenance
 from caster_gym.shipped_files import read_settings
 
+WORTH_KEEPING = tuple(f"policies/*/{name}" for name in training.WORTH_KEEPING)
 FILES = (*results.FILES, "run.yaml", *(f"policies/*/{name}" for name in training.FILES))
 
 
@@ -77,11 +78,14 @@ def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | No
     return Comparison(settings, read_settings(TaskSettings, "tasks", settings.task), agents)
 
 
-def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) -> str:
+def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT, resume: bool = False) -> str:
     """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
 
     threads: of each training run, of which there are as many at a time as the cores allow, and of the evaluation. The
     folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
+
+    resume: trainings in policies/ that are completed are used as they are, others go on where they stopped, and new
+    ones are begun. Raises ConfigurationError where one has other settings.
     """
     settings, task, agents = comparison
     jobs = [
@@ -101,7 +105,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT) 
             for name, agent in agents.items()
             if isinstance(agent, ControllerSettings)
         }
-    train_all(jobs, threads)
+    train_all(jobs, threads, resume)
     ready: dict[str, list[tuple[Agent, int | None]]] = {
         name: [(tuned[name].controller, None)]
         if name in tuned

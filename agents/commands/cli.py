@@ -8,12 +8,12 @@ import typer
 
 import caster_gym
 from caster_gym.agents.commands.command_line import (
-    DEFAULT_THREADS,
     NOTHING_WRITTEN,
     PARTS_BAR,
     Changes,
     Out,
     Overwrite,
+    Resume,
     TaskName,
     Threads,
     TrainedTask,
@@ -62,13 +62,14 @@ def train(
     seed: Annotated[int, typer.Option(help="Seed of networks, exploration and starts.", min=0, max=2**32 - 1)] = 0,
     out: Out = Path("runs/train"),
     overwrite: Overwrite = False,
+    resume: Resume = False,
     change: Changes = None,
-    threads: Threads = DEFAULT_THREADS,
+    threads: Threads = 1,
 ) -> None:
     """Train a policy. Save the one that is best on the validation paths in OUT/best, for `evaluate` and `watch`."""
     with plain_errors():
         from caster_gym.agents.comparison.metrics import in_words
-        from caster_gym.agents.learning.training import FILES
+        from caster_gym.agents.learning.training import FILES, WORTH_KEEPING
         from caster_gym.agents.learning.training import train as run
 
         settings = read_agent(agent, changes_of(change))
@@ -82,12 +83,12 @@ def train(
             "unit": "step",
             "unit_scale": True,
         }
-        with begun(out, overwrite, "best/policy.yaml", kept, FILES), progress(**bar) as show:
+        with begun(out, overwrite, WORTH_KEEPING, kept, FILES, resume), progress(**bar) as show:
 
             def report(steps: int, verdict: str) -> None:
                 show(min(steps, settings.n_timesteps), verdict)
 
-            best = run(tasks, settings, seed, out, report, threads)
+            best = run(tasks, settings, seed, out, report, threads, resume)
         typer.echo(
             f"Best on validation paths after {best.steps} steps and {best.seconds:.0f} s: {in_words(best.verdict)}. "
             f"It is in {out / 'best'}."
@@ -101,7 +102,7 @@ def evaluate(
     starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
     out: Out = Path("runs/evaluate"),
     overwrite: Overwrite = False,
-    threads: Threads = DEFAULT_THREADS,
+    threads: Threads = 1,
 ) -> None:
     """Evaluate an agent on the test paths of a task. Write a table, all episodes as CSV, and figures."""
     with plain_errors():
@@ -117,18 +118,25 @@ def benchmark(
     config: Annotated[str, typer.Option(help="Name of a comparison in configs/benchmarks, or a YAML file.")] = "track",
     out: Out = Path("runs/benchmark"),
     overwrite: Overwrite = False,
+    resume: Resume = False,
     change: Changes = None,
-    threads: Threads = DEFAULT_THREADS,
+    threads: Threads = 1,
 ) -> None:
     """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
     with plain_errors():
-        from caster_gym.agents.commands.benchmark import FILES, BenchmarkSettings, read_comparison, run_benchmark
+        from caster_gym.agents.commands.benchmark import (
+            FILES,
+            WORTH_KEEPING,
+            BenchmarkSettings,
+            read_comparison,
+            run_benchmark,
+        )
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
         named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
-        with begun(out, overwrite, "policies/*/best/policy.yaml", named, FILES):
-            text = run_benchmark(comparison, out, threads)
+        with begun(out, overwrite, WORTH_KEEPING, named, FILES, resume):
+            text = run_benchmark(comparison, out, threads, resume)
         typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")
 

@@ -10,16 +10,18 @@ from gymnasium.error import DependencyNotInstalled
 from tqdm import tqdm
 
 from caster_gym.configuration import parse_yaml
-from caster_gym.engines.native.cores import learning_threads
 
 NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 MOST_THREADS = 1024  # far more make systems refuse memory that is there
 LONGEST_MESSAGE = 1000  # characters
-DEFAULT_THREADS = learning_threads()
 
 Out = Annotated[Path, typer.Option(help="Folder for the results. It must be empty or not exist yet.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete the contents of that folder first.")]
+Resume = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on in that folder, wherever it was stopped; begin if it is empty."),
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(
@@ -39,8 +41,7 @@ Threads = Annotated[
     typer.Option(
         min=1,
         max=MOST_THREADS,
-        help="Threads per process, for networks and simulation. Results depend on this number. "
-        "OMP_NUM_THREADS sets the default.",
+        help="Threads per process, for networks and simulation. Results depend on this number.",
     ),
 ]
 

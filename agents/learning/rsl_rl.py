@@ -10,6 +10,15 @@ from gymnasium.error import DependencyNotInstalled
 from torch import Tensor
 
 from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.saved_state import (
+    Snapshot,
+    generator_arrays,
+    generator_numbers,
+    named,
+    optimizer_arrays,
+    restore_generators,
+    restore_optimizer,
+)
 from caster_gym.agents.learning.settings import RslPPOSettings, scheduled
 from caster_gym.agents.learning.tensors import torch_fields
 from caster_gym.agents.learning.training_run import Run
@@ -119,6 +128,27 @@ def actor_of(runner: OnPolicyRunner, settings: RslPPOSettings) -> Actor:
     return actor
 
 
+def take(runner: OnPolicyRunner, environment: RslVecEnv) -> Snapshot:
+    """All that is needed to go on from between two rounds."""
+    arrays = {
+        **named("actor", runner.alg.actor.state_dict()),
+        **named("critic", runner.alg.critic.state_dict()),
+        **optimizer_arrays("optimizer", runner.alg.optimizer),
+        **named("environment", environment.get_state()),
+        **generator_arrays(environment.device),
+    }
+    return Snapshot(arrays, {"generators": generator_numbers()})
+
+
+def restore(runner: OnPolicyRunner, environment: RslVecEnv, kept: Snapshot) -> None:
+    """Let a learner and its robots be as when a state was taken."""
+    runner.alg.actor.load_state_dict(kept.tensors("actor"))
+    runner.alg.critic.load_state_dict(kept.tensors("critic"))
+    restore_optimizer(runner.alg.optimizer, kept, "optimizer")
+    environment.set_state(kept.within("environment"))
+    restore_generators(kept, environment.device)
+
+
 def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
     """Train on tensors."""
     environment = RslVecEnv(
@@ -133,10 +163,13 @@ def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
         run.seed,
     )
     runner = make_runner(settings, environment, run.seed)
-    steps, round_ = 0, settings.n_envs * settings.n_steps
+    if run.saved is not None:
+        restore(runner, environment, run.saved)
+    steps, round_ = run.steps, settings.n_envs * settings.n_steps
     try:
         while steps < settings.n_timesteps:
             run.advance(steps, lambda: actor_of(runner, settings))
+            run.save(steps, lambda: take(runner, environment))
             rate = scheduled(settings.learning_rate, 1.0 - steps / settings.n_timesteps)
             runner.alg.learning_rate = rate
             for group in runner.alg.optimizer.param_groups:

@@ -12,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from caster_gym.agents.comparison.evaluation import training_batch
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.sb3_environment import SB3VecEnv
+from caster_gym.agents.learning.sb3_state import SB3State
 from caster_gym.agents.learning.settings import LinearSchedule, PPOSettings, SACSettings
 from caster_gym.agents.learning.training_run import Run
 
@@ -31,7 +32,7 @@ def make_learner(settings: PPOSettings | SACSettings, environment: VecEnv, seed:
         "device": "cpu",
     }
     if isinstance(settings, PPOSettings):
-        return PPO(
+        return RoundsCounted(
             **shared,
             n_steps=settings.n_steps,
             n_epochs=settings.n_epochs,
@@ -66,12 +67,23 @@ def actor_of(learner: BaseAlgorithm, settings: PPOSettings | SACSettings) -> Act
     return actor
 
 
-class Watcher(BaseCallback):
-    """Tells a run how far SB3 is."""
+class RoundsCounted(PPO):
+    """PPO that counts its rounds from the first step on, also when it goes on where another process stopped."""
 
-    def __init__(self, run: Run, settings: PPOSettings | SACSettings) -> None:
+    def dump_logs(self, iteration: int = 0) -> None:
+        """Write what was recorded."""
+        super().dump_logs(self.num_timesteps // (self.n_steps * self.n_envs))
+
+
+class Watcher(BaseCallback):
+    """Tells a run how far SB3 is, and saves and gives back its state between rounds."""
+
+    def __init__(self, run: Run, settings: PPOSettings | SACSettings, state: SB3State) -> None:
         super().__init__()
-        self.run, self.settings = run, settings
+        self.run, self.settings, self.state = run, settings, state
+
+    def _on_training_start(self) -> None:
+        self.state.restore()
 
     def _on_step(self) -> bool:
         if isinstance(self.model, SAC):
@@ -81,17 +93,20 @@ class Watcher(BaseCallback):
     def _on_rollout_start(self) -> None:
         if not isinstance(self.model, SAC):
             self._watch()
+        if self.run.save(self.model.num_timesteps, self.state.take):
+            self.state.saved()
 
     def _watch(self) -> None:
-        self.run.advance(self.num_timesteps, lambda: actor_of(self.model, self.settings))
+        self.run.advance(self.model.num_timesteps, lambda: actor_of(self.model, self.settings))
 
 
 def learn_with_sb3(run: Run, settings: PPOSettings | SACSettings) -> None:
     """Train on the native batch of NumPy arrays."""
     learner = make_learner(settings, SB3VecEnv(training_batch(run.task, settings.n_envs)), run.seed)
     learner.set_logger(run.logger)
+    state = SB3State(learner, run.state_folder, run.saved)
     try:
-        learner.learn(settings.n_timesteps, callback=Watcher(run, settings))
+        learner.learn(settings.n_timesteps, callback=Watcher(run, settings, state))
     except ValueError as error:
         if "of distribution" in str(error):  # as Torch says of actions that are drawn from no numbers
             run.diverged(learner.num_timesteps, error)

@@ -48,6 +48,7 @@ class LearnerSettings(AgentSettings):
 
     n_timesteps: PositiveInt  # control periods of all robots together
     validations: PositiveInt = 10  # how often the policy is tried on validation paths, evenly spread
+    save_every: NonNegativeFloat = 15.0  # [s] between two states from which a killed training can go on
 
     @property
     def name(self) -> str:
@@ -56,7 +57,11 @@ class LearnerSettings(AgentSettings):
 
     @abstractmethod
     def learn(self, run: "Run") -> None:
-        """Train for `n_timesteps`; call `run.advance` in between, and `run.finish` at the end in any case."""
+        """Train for `n_timesteps`; call `run.advance` in between, and `run.finish` at the end in any case.
+
+        A learner that goes on where a killed process stopped begins from `run.saved`, if that is not None, and offers
+        its state to `run.save` now and then; one that does not begins anew.
+        """
 
 
 class GradientLearner(LearnerSettings):

@@ -17,11 +17,20 @@ from torch import Tensor, nn
 from caster_gym import load_robot
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.saved_state import (
+    Snapshot,
+    generator_arrays,
+    generator_numbers,
+    named,
+    optimizer_arrays,
+    restore_generators,
+    restore_optimizer,
+)
 from caster_gym.agents.learning.settings import SHACSettings, scheduled
 from caster_gym.agents.learning.tensors import check_compiler, torch_fields
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.engines.time_step import longest_time_step, substeps_for
-from caster_gym.envs.tensor.state import TaskOutcome
+from caster_gym.envs.tensor.state import TaskOutcome, TaskState
 from caster_gym.envs.tensor.task import TorchTask
 
 MOMENTA = (0.7, 0.95)  # of the policy's Adam, as the paper has them: gradients through a simulator scatter little
@@ -96,6 +105,32 @@ class ShortHorizon:
             "critic_loss": loss,
             "learning_rate": rate,
         }
+
+    def take(self) -> Snapshot:
+        """All that is needed to go on from between two windows."""
+        arrays = generator_arrays(self.task.device)
+        for name, module in self._networks.items():
+            arrays |= named(name, module.state_dict())
+        arrays |= optimizer_arrays("actor_optimizer", self.actor_optimizer)
+        arrays |= optimizer_arrays("critic_optimizer", self.critic_optimizer)
+        arrays |= named("robots", self.state._asdict()) | named("outcome", self.outcome._asdict())
+        return Snapshot(arrays, {"generators": generator_numbers()})
+
+    def restore(self, kept: Snapshot) -> None:
+        """Be as when a state was taken."""
+        for name, module in self._networks.items():
+            module.load_state_dict(kept.tensors(name))
+        restore_optimizer(self.actor_optimizer, kept, "actor_optimizer")
+        restore_optimizer(self.critic_optimizer, kept, "critic_optimizer")
+        robots, outcome = (
+            {key: one.to(self.task.device) for key, one in kept.tensors(part).items()} for part in ("robots", "outcome")
+        )
+        self.state, self.outcome = TaskState(**robots), TaskOutcome(**outcome)
+        restore_generators(kept, self.task.device)
+
+    @property
+    def _networks(self) -> dict[str, nn.Module]:
+        return {"actor": self.actor, "critic": self.critic, "target": self.target}
 
     def start_some_anew(self) -> None:
         """A new episode for each robot with the probability that the settings say."""
@@ -204,10 +239,13 @@ def _fewest_substeps(task: TaskSettings) -> int:
 def learn_through_simulator(run: Run, settings: SHACSettings) -> None:
     """Train on tensors."""
     learner = ShortHorizon(make_task(run.task, settings), settings, run.seed)
-    steps = 0
+    if run.saved is not None:
+        learner.restore(run.saved)
+    steps = run.steps
     try:
         while steps < settings.n_timesteps:
             run.advance(steps, lambda: frozen(learner.actor))
+            run.save(steps, learner.take)
             facts = learner.improve(steps / settings.n_timesteps)
             steps += settings.n_steps * settings.n_envs
             run.record(steps, {f"train/{name}": value for name, value in facts.items()})

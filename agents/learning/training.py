@@ -3,61 +3,86 @@
 With the same settings, seed, number of threads and versions on the same machine, a training run repeats bit for bit.
 """
 
+import multiprocessing
+import queue
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
+from caster_gym.agents.comparison.metrics import in_words
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS
+from caster_gym.agents.learning.resuming import best_of, is_completed
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training_run import Report, Run
-from caster_gym.agents.workers.calls import Call, Reported
-from caster_gym.agents.workers.local import LocalWorkers
+from caster_gym.durable_files import MARK, FolderLock
 from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.own_errors import in_own_code
 from caster_gym.report.provenance import write_provenance
 
 FILES = (
-    *("run.yaml", "validation.csv", "progress.csv", "events.out.tfevents.*", "state/*"),
+    *(MARK, "run.yaml", "validation.csv", "progress.csv", "events.out.tfevents.*", "state/*"),
     *(f"{folder}/{name}" for folder in ("best", "checkpoints/*") for name in (DESCRIPTION, WEIGHTS)),
 )  # patterns of what is in the folder of a run
+WORTH_KEEPING = ("best/policy.yaml", "state/state.safetensors")  # of a run that was stopped
 
 
 def train(
-    task: TaskSettings, settings: LearnerSettings, seed: int, folder: Path, report: Report, threads: int = DEFAULT
+    task: TaskSettings,
+    settings: LearnerSettings,
+    seed: int,
+    folder: Path,
+    report: Report,
+    threads: int = DEFAULT,
+    resume: bool = False,
 ) -> Validation:
     """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
     Interrupted by Ctrl-C, it validates and keeps what it has learned so far, then raises KeyboardInterrupt.
+
+    resume: go on where the training in this folder stopped, however its process ended; the result is the same to the
+    last bit as without a stop. A folder without one is begun; one that is completed is left as it is, and its best
+    validation returned. Raises ConfigurationError where the training there has other settings.
     """
-    run = Run(folder, task, settings, seed, report)
-    completed = False
-    try:
-        with limit_threads(threads), _told(settings):
-            settings.learn(run)
-        completed = True
-    finally:
-        if run.history:
-            write_provenance(
-                folder,
-                task=task.model_dump(mode="json"),
-                agent=settings.model_dump(mode="json"),
-                source=settings.source,
-                seed=seed,
-                threads=threads,
-                completed=completed,
-                seconds=run.history[-1].seconds,
-                validations=[result.numbers for result in run.history],
+    folder.mkdir(parents=True, exist_ok=True)
+    with FolderLock(folder):
+        facts = {
+            "task": task.model_dump(mode="json"),
+            "agent": settings.model_dump(mode="json"),
+            "robot": task.described_robot.model_dump(mode="json"),
+            "source": settings.source,
+            "seed": seed,
+            "threads": threads,
+        }
+        if resume and is_completed(folder, facts):
+            return best_of(folder, task)
+        write_provenance(folder, **facts, completed=False)
+        run = Run(folder, task, settings, seed, report, resume)
+        completed = False
+        try:
+            with limit_threads(threads), _told(settings):
+                settings.learn(run)
+            completed = True
+        finally:
+            if run.history:
+                measured = {
+                    "seconds": run.history[-1].seconds,
+                    "validations": [result.numbers for result in run.history],
+                }
+                write_provenance(folder, **facts, completed=completed and run.best is not None, **measured)
+            run.logger.close()
+        if run.best is None:
+            raise ValueError(
+                f"{settings.algorithm} has learned nothing: its method learn must call run.finish at the end"
             )
-        run.logger.close()
-    if run.best is None:
-        raise ValueError(f"{settings.algorithm} has learned nothing: its method learn must call run.finish at the end")
-    return run.best
+        run.remove_state()
+        return run.best
 
 
 def _told(settings: LearnerSettings) -> AbstractContextManager[None]:
@@ -77,19 +102,37 @@ class Job(NamedTuple):
     folder: Path
 
 
-def train_all(jobs: Sequence[Job], threads: int = DEFAULT) -> None:
+def train_all(jobs: Sequence[Job], threads: int = DEFAULT, resume: bool = False) -> None:
     """Train all jobs, as many at a time as there are cores for their threads, with one progress bar over all steps.
 
-    Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised.
+    Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised. resume: see
+    `train`; jobs that are completed take no time.
     """
     if not jobs:
         return
-    with LocalWorkers(max(1, min(len(jobs), usable_cores() // threads))) as workers, _bar(jobs) as show:
-        for job in jobs:
-            workers.submit(Call(job.name, _train_job, (job, threads)))
-        for event in workers.events():
-            if isinstance(event, Reported):
-                show(event.number, *event.content)
+    workers = max(1, min(len(jobs), usable_cores() // threads))
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as manager, _bar(jobs) as show:
+        reports = manager.Queue()
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            futures = [pool.submit(_train_job, i, job, threads, resume, reports) for i, job in enumerate(jobs)]
+            try:
+                while not all(future.done() for future in futures):
+                    _raise_errors(futures)
+                    try:
+                        show(*reports.get(timeout=0.5))
+                    except queue.Empty:
+                        continue
+                _raise_errors(futures)
+            except BaseException:
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+
+
+def _raise_errors(futures: Sequence["Future[None]"]) -> None:
+    for future in futures:
+        if future.done():
+            future.result()
 
 
 @contextmanager
@@ -108,5 +151,9 @@ def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
         yield show
 
 
-def _train_job(job: Job, threads: int, report: Callable[[tuple[int, str]], None]) -> None:
-    train(job.task, job.agent, job.seed, job.folder, lambda *progress: report(progress), threads)
+def _train_job(index: int, job: Job, threads: int, resume: bool, reports: Any) -> None:
+    def report(steps: int, verdict: str) -> None:
+        reports.put((index, steps, verdict))
+
+    best = train(job.task, job.agent, job.seed, job.folder, report, threads, resume)
+    report(job.agent.n_timesteps, in_words(best.verdict))

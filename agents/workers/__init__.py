@@ -1,1 +1,0 @@
-"""Other processes that work: on this machine, or on a cluster."""

@@ -1,0 +1,146 @@
+"""caster_gym.agents.learning.resuming: a training that was killed goes on, and ends as if nothing had happened."""
+
+import csv
+import random
+import shutil
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from caster_gym.agents.comparison.task_settings import TaskSettings
+from caster_gym.agents.learning.settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings
+from caster_gym.agents.learning.training import train
+from caster_gym.configuration import ConfigurationError, parse
+
+CLOCKS = ("seconds", "validation/seconds", "time/fps", "time/time_elapsed")  # columns that tell the time of day
+TINY: dict[str, Any] = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2, "save_every": 0.0}
+TENSORS: dict[str, Any] = {"net_arch": (8,), "n_envs": 4, "compile": False, "device": "cpu", "save_every": 0.0}
+LEARNERS = {
+    "ppo": PPOSettings(algorithm="ppo", n_timesteps=2048, n_steps=64, n_epochs=2, **TINY),
+    "sac": SACSettings(
+        algorithm="sac", n_timesteps=1600, gradient_steps=1, buffer_size=900, learning_starts=200, **TINY
+    ),
+    "rsl_ppo": RslPPOSettings(algorithm="rsl_ppo", n_timesteps=80, n_steps=4, batch_size=16, validations=2, **TENSORS),
+    "shac": SHACSettings(algorithm="shac", n_timesteps=48, n_steps=2, batch_size=8, validations=3, **TENSORS),
+}
+PATHS = {"shape": "random_paths", "count": 3, "duration": 1.0, "max_speed": 0.3}
+PLAIN = {"train": [{**PATHS, "seed": 0}], "validation": [{**PATHS, "seed": 1}], "test": [{**PATHS, "seed": 2}]}
+FEATURES = {"wrappers": [{"kind": "sensor_noise", "position": 0.001}], "shaping": [{"kind": "effort"}]}
+ON_TENSORS = parse(TaskSettings, PLAIN, "task")
+ON_ARRAYS = parse(TaskSettings, {**PLAIN, **FEATURES}, "task")  # which know features
+TASKS = {"ppo": ON_ARRAYS, "sac": ON_ARRAYS, "rsl_ppo": ON_TENSORS, "shac": ON_TENSORS}
+
+
+def nothing(steps, verdict):
+    pass
+
+
+def table(path):
+    """A CSV file without the columns that tell the time."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [{name: cell for name, cell in row.items() if name not in CLOCKS} for row in csv.DictReader(file)]
+
+
+def content(folder):
+    """What a training has left: bytes of its policies, and its tables without the time."""
+    files = sorted(path for place in ("best", "checkpoints") for path in (folder / place).rglob("*") if path.is_file())
+    policies = {str(path.relative_to(folder)): path.read_bytes() for path in files}
+    return policies, table(folder / "validation.csv"), table(folder / "progress.csv")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """A learner's training that nobody disturbed, and copies of its folder as a kill at some instants leaves it."""
+
+    @cache
+    def finish(name):
+        above = tmp_path_factory.mktemp(name)
+        folder, copies = above / "run", list[Path]()
+
+        def look(steps, verdict):
+            if steps >= LEARNERS[name].n_timesteps * (len(copies) + 1) / 4:
+                copies.append(above / f"killed-{len(copies)}")
+                shutil.copytree(folder, copies[-1])
+
+        train(TASKS[name], LEARNERS[name], 3, folder, look)
+        return folder, copies
+
+    return finish
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_killed_training_ends_as_one_that_nobody_disturbed(undisturbed, tmp_path, name):
+    """Whatever the global generators of the new process are."""
+    folder, copies = undisturbed(name)
+    assert len(copies) >= 3
+    for number, killed in enumerate(copies):
+        assert (killed / "state" / "state.safetensors").exists()
+        copy = tmp_path / killed.name
+        shutil.copytree(killed, copy)
+        random.seed(number)
+        np.random.seed(number)  # noqa: NPY002
+        torch.manual_seed(number)
+        train(TASKS[name], LEARNERS[name], 3, copy, nothing, resume=True)
+        assert content(copy) == content(folder)
+        assert not (copy / "state").exists()
+        assert yaml.safe_load((copy / "run.yaml").read_text(encoding="utf-8"))["completed"] is True
+
+
+def test_an_interrupted_training_ends_as_one_that_nobody_disturbed(undisturbed, tmp_path):
+    """What it validated when it was interrupted, at a step at which it would not have, is gone again."""
+
+    def interrupt(steps, verdict):
+        if steps >= 1400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(ON_ARRAYS, LEARNERS["ppo"], 3, tmp_path, interrupt)
+    assert content(tmp_path)[1] != content(undisturbed("ppo")[0])[1]
+    train(ON_ARRAYS, LEARNERS["ppo"], 3, tmp_path, nothing, resume=True)
+    assert content(tmp_path) == content(undisturbed("ppo")[0])
+
+
+def test_a_completed_training_is_left_as_it_is(undisturbed):
+    folder, _ = undisturbed("shac")
+    before = content(folder), (folder / "run.yaml").read_bytes()
+
+    def refuse(steps, verdict):
+        raise AssertionError("it trains")
+
+    best = train(ON_TENSORS, LEARNERS["shac"], 3, folder, refuse, resume=True)
+    assert (content(folder), (folder / "run.yaml").read_bytes()) == before
+    assert any(int(row["steps"]) == best.steps for row in before[0][1])
+
+
+@pytest.mark.parametrize(
+    ("seed", "changes", "words"),
+    [(4, {}, "seed 3, and now it is 4"), (3, {"gamma": 0.5}, r"agent.gamma 0.97, and now it is 0.5")],
+)
+def test_other_settings_than_those_of_the_folder_are_refused_by_name(undisturbed, seed, changes, words):
+    folder, _ = undisturbed("shac")
+    before = content(folder)
+    with pytest.raises(ConfigurationError, match=words):
+        train(ON_TENSORS, LEARNERS["shac"].model_copy(update=changes), seed, folder, nothing, resume=True)
+    assert content(folder) == before
+
+
+def test_how_often_state_is_saved_may_change(undisturbed):
+    folder, _ = undisturbed("shac")
+    train(ON_TENSORS, LEARNERS["shac"].model_copy(update={"save_every": 7.0}), 3, folder, nothing, resume=True)
+
+
+def test_a_folder_without_a_training_begins_one(tmp_path, undisturbed):
+    train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "new", nothing, resume=True)
+    assert content(tmp_path / "new") == content(undisturbed("shac")[0])
+
+
+def test_a_state_that_is_none_says_so(undisturbed, tmp_path):
+    shutil.copytree(undisturbed("shac")[1][0], tmp_path / "run")
+    (tmp_path / "run" / "state" / "state.safetensors").write_bytes(b"nothing")
+    with pytest.raises(ConfigurationError, match="holds no state from which a training can go on"):
+        train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
