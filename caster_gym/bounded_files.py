@@ -11,6 +11,7 @@ from pathlib import Path
 # Greatest sizes [bytes]. All that is read is turned into objects within about a second and 200 MB.
 YAML_BYTES = 4 << 20  # four times what a task with a timed path of 15,000 poses takes
 TABLE_BYTES = 8 << 20  # 50,000 rows of ten columns
+PLANNED_BYTES = 4 << 20  # 20,000 samples as planners write them in JSON
 WEIGHTS_BYTES = 128 << 20  # 33 million weights, in single precision
 
 _KINDS = (

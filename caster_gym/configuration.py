@@ -2,7 +2,6 @@
 
 import difflib
 import re
-import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, UnionType
@@ -14,11 +13,12 @@ from pydantic.functional_validators import ModelWrapValidatorHandler
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from caster_gym.bounded_files import YAML_BYTES, read_bytes
+from caster_gym.brief import brief, cut
 from caster_gym.file_names import FOLDER
 from caster_gym.plain_yaml import YamlError, read_plain_yaml
 
+_LONGEST_MESSAGE = 600  # characters of what is wrong in one place
 _SURVEYED = 200  # problems that are looked at
-LONGEST_VALUE = 80  # characters of a value in a message
 MOST_PROBLEMS = 8  # in a message
 SMALLEST, GREATEST = 1e-12, 1e15  # of numbers in SI units: farther out, products of some of them lose their sense
 
@@ -41,12 +41,18 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    longest_list: ClassVar[int] = 1000  # items of a list or keys of a mapping in it
+
     # What others call a field, or what is not set here: the field's name here, or where to set it, in words
     usual_names: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     @model_validator(mode="wrap")
     @classmethod
     def _numbers_are_numbers(cls, content: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(content, Mapping):
+            for key, value in content.items():
+                if isinstance(value, list | tuple | Mapping) and len(value) > cls.longest_list:
+                    raise ValueError(f"{brief(key)} has {len(value)} items, at most {cls.longest_list} are read")
         model = read(content)
         if isinstance(content, Mapping):
             problems = [
@@ -183,14 +189,14 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
     if kind == "extra_forbidden":
         place, key = _place(model, location[:-1]), str(location[-1])
         models = [one for one in place.members if _is_model(one)]
-        return f"{place.around}unknown key {'.'.join((*place.keys, key))!r}", f"; {_advice(key, models)}", ""
+        return f"{place.around}unknown key {brief('.'.join((*place.keys, key)))}", f"; {_advice(key, models)}", ""
     where = str(_place(model, location))
     if kind == "missing":
         return where, " is missing", ""
     if kind == "union_tag_invalid":
         known = set(str(details["expected_tags"]).replace("'", "").split(", "))
         tag, discriminator = details["tag"], str(details["discriminator"]).strip("'")
-        return where, f": unknown {discriminator} {tag!r}; {did_you_mean(tag, known)}", ""
+        return where, f": unknown {discriminator} {brief(tag)}; {did_you_mean(tag, known)}", ""
     if kind == "union_tag_not_found":
         return where, f": {details['discriminator']} is missing", ""
     if kind in ("too_short", "too_long") and "actual_length" in details:
@@ -204,8 +210,9 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         or message.startswith("there is no ")
         or isinstance(details.get("error"), ConfigurationError)
     )
+    message = cut(message, _LONGEST_MESSAGE)
     joint = " " if message.startswith(("should", "must", "needs")) else ": "
-    return where, f"{joint if where else ''}{message}", "" if complete else f", got {_shortened(problem['input'])}"
+    return where, f"{joint if where else ''}{message}", "" if complete else f", got {brief(problem['input'])}"
 
 
 _PLAIN = {  # for what pydantic says in terms of Python
@@ -215,17 +222,6 @@ _PLAIN = {  # for what pydantic says in terms of Python
     **dict.fromkeys(("float_type", "float_parsing"), "should be a number"),
     **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "should be a whole number"),
 }
-
-
-_BRIEF = reprlib.Repr()
-_BRIEF.maxlevel = 3
-_BRIEF.maxtuple = _BRIEF.maxlist = _BRIEF.maxdict = _BRIEF.maxset = 8
-_BRIEF.maxstring = _BRIEF.maxother = LONGEST_VALUE
-
-
-def _shortened(value: object) -> str:
-    text = _BRIEF.repr(value)  # a value may be far larger than its file, by aliases
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
 
 
 class _Place(NamedTuple):

@@ -12,7 +12,9 @@ from typing import Any
 
 import yaml
 
-MOST_VALUES = 200_000  # with aliases written out; a task with a timed path of 15,000 poses has 80,000
+from caster_gym.brief import brief
+
+MOST_VALUES = 150_000  # with aliases written out; a timed path of 10 minutes at 50 Hz
 DEEPEST = 50  # lists and mappings in one another; the settings of a comparison have 8
 LONGEST_TEXT = 20_000  # characters of a key or a value
 LONGEST_NUMBER = 64  # characters; of integers, 64 digits are more than any seed has
@@ -30,7 +32,6 @@ _INTEGER = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)")
 _OTHER_BASE = re.compile(r"([-+]?)(?:0b([01_]+)|0x([0-9a-fA-F_]+)|0([0-7_]+))")
 _FLOAT = re.compile(r"[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*|[0-9]+(?=[eE]))(?:[eE][-+]?[0-9]+)?")
 _BEGINS_NUMBERS = frozenset("+-.0123456789")
-_SHOWN = 80  # characters of a value in a message
 _NONE, _MERGE = object(), object()
 _TAGS = {  # what may be said of a value that is one anyway
     "tag:yaml.org,2002:str": str,
@@ -89,7 +90,7 @@ class _Open:
         if not isinstance(key, str):
             raise _fault(f"a key must be text, got {_kind(key)}", event)
         if key in self.value:
-            raise _fault(f"the key {_shown(key)} stands twice", event)
+            raise _fault(f"the key {brief(key)} stands twice", event)
         return key
 
     def _checked_merge(self, value: Any, event: Any) -> list[dict[str, Any]]:
@@ -132,7 +133,7 @@ class _Builder:
                 self._put(value, self._count - whole.before, whole.start)
             elif isinstance(event, yaml.AliasEvent):
                 if event.anchor not in self._anchors:
-                    raise _fault(f"the alias {_shown(event.anchor)} stands for nothing complete before it", event)
+                    raise _fault(f"the alias {brief(event.anchor)} stands for nothing complete before it", event)
                 value, size = self._anchors[event.anchor]
                 self._grow(size, event)
                 self._put(value, size, event)
@@ -193,19 +194,14 @@ def _check_tag(value: Any, event: Any) -> None:
     if event.tag is None or event.tag == "!":
         return
     if event.tag not in _TAGS:
-        raise _fault(f"the tag {_shown(event.tag)} is not read: files hold data alone", event)
+        raise _fault(f"the tag {brief(event.tag)} is not read: files hold data alone", event)
     if type(value) is not _TAGS[event.tag]:
-        raise _fault(f"the tag {_shown(event.tag)} does not fit {_kind(value)}", event)
+        raise _fault(f"the tag {brief(event.tag)} does not fit {_kind(value)}", event)
 
 
 def _kind(value: Any) -> str:
     names = {dict: "a mapping", list: "a list", type(None): "nothing"}
-    return names.get(type(value)) or _shown(value)
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+    return names.get(type(value)) or brief(value)
 
 
 def _fault(problem: str, event: Any) -> YamlError:

@@ -9,7 +9,7 @@ from itertools import combinations
 from math import hypot
 from typing import TYPE_CHECKING, NamedTuple
 
-from caster_gym.configuration import LONGEST_VALUE
+from caster_gym.brief import cut
 
 if TYPE_CHECKING:
     from caster_gym.robot import Caster, Motor, Robot
@@ -41,9 +41,10 @@ def warn_if_implausible(robot: "Robot") -> None:
     for sentence, numbers in sentences.items():
         said.append(f"caster{'s' * (len(numbers) > 1)} {', '.join(numbers)}: {sentence}")
     if said:
-        name = robot.name if len(robot.name) <= LONGEST_VALUE else f"{robot.name[:LONGEST_VALUE]}…"
         units = "the numbers are in m, kg, kg m², N m and rad/s"
-        warnings.warn(f"robot {name!r} can hardly be meant so ({units}): {'; '.join(said)}", RobotWarning, stacklevel=2)
+        warnings.warn(
+            f"robot {cut(robot.name)!r} can hardly be meant so ({units}): {'; '.join(said)}", RobotWarning, stacklevel=2
+        )
 
 
 def _crowding(robot: "Robot") -> Iterator[str]:

@@ -18,6 +18,8 @@ from caster_gym.shipped_files import find, names_of, own_file
 
 Pair: TypeAlias = tuple[float, float]
 
+MOST_CASTERS = 200
+
 
 class Motor(Frozen):
     """The motor of one joint, seen at that joint."""
@@ -161,7 +163,7 @@ class Robot(Frozen):
 
     name: str
     platform: Platform
-    casters: Annotated[tuple[Caster, ...], Field(min_length=2)]
+    casters: Annotated[tuple[Caster, ...], Field(min_length=2, max_length=MOST_CASTERS)]
     actuation: Literal["all"] | tuple[str, ...] = "all"  # which joints are driven, e.g. (roll_1, steer_1, roll_2)
     # [-] between wheels and floor; tells how much of it is used
     floor_friction: Annotated[float, Field(gt=0.0, le=GREATEST)] = 0.7

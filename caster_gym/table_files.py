@@ -14,6 +14,8 @@ from caster_gym.tables import DECIMAL_COMMA, Column, Table, refuse_decimal_comma
 from caster_gym.units import is_unit
 
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".tum", ".dat")
+MOST_LINES, LONGEST_LINE = 60_000, 5000  # ten minutes at 100 Hz; characters
+_REMEDY = "; keep every tenth row, or a part of it"
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks"}
 _COMMENT = re.compile(r"\s*(#|%|//)")
 _OF_SYMBOLS = frozenset("°µ·²³º")  # the only ones in Western one-byte encodings that headers need
@@ -22,7 +24,7 @@ _TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")  # what a .tum fi
 
 def read_table(path: Path) -> Table:
     """The table in a file. Raises ValueError that names file, line and value, and says what to change."""
-    lines = [(number, line) for number, line in enumerate(read_text(path).splitlines(), start=1) if line.strip()]
+    lines = [(number, line) for number, line in enumerate(read_lines(path), start=1) if line.strip()]
     if lines and (told := re.fullmatch(r"sep=(.)", lines[0][1].strip())):  # of spreadsheets
         lines = lines[1:] if told[1] in _SEPARATORS else lines
     first = next((i for i, (_, line) in enumerate(lines) if not _COMMENT.match(line)), len(lines))
@@ -32,7 +34,8 @@ def read_table(path: Path) -> Table:
     if body and not _is_of_numbers(body[0][1]):
         separator = _separator(body[0][1])
         header = _header(body[0][1], separator)
-        below = [line for number, line in lines if body[0][0] < number < (body[1:] or [(0, "")])[0][0]]
+        start, end = body[0][0], body[1][0] if len(body) > 1 else 0  # lines of the header and of the first row
+        below = [line for number, line in lines if start < number < end]
         body = body[1:]
         header = next(filter(None, (_with_units_of(line, header) for line in below)), header)
     else:
@@ -47,9 +50,24 @@ def read_table(path: Path) -> Table:
     return Table(str(path), tuple(header), rows, [number for number, _ in cells])
 
 
-def read_text(path: Path) -> str:
-    """Text of a file, in UTF-8, UTF-16 with a byte-order mark, or the one-byte encoding of Western spreadsheets."""
-    content = read_bytes(path, TABLE_BYTES, "; keep every tenth row, or a part of it")
+def read_lines(path: Path) -> list[str]:
+    """Lines of a file as `read_text` reads it, not too many of them and none too long."""
+    text = read_text(path)
+    ends = max(text.count("\n"), text.count("\r"))
+    lines = text.splitlines() if ends <= MOST_LINES else []
+    if max(ends, len(lines)) > MOST_LINES:
+        raise ValueError(f"{path} has {max(ends, len(lines))} lines, at most {MOST_LINES} are read{_REMEDY}")
+    for number, line in enumerate(lines, start=1):
+        if len(line) > LONGEST_LINE:
+            raise ValueError(f"{path}, line {number}: it has {len(line)} characters, at most {LONGEST_LINE} are read")
+    return lines
+
+
+def read_text(path: Path, most: int = TABLE_BYTES) -> str:
+    """Text of a file of at most so many bytes.
+
+    It is in UTF-8, UTF-16 with a byte-order mark, or the one-byte encoding of Western spreadsheets."""
+    content = read_bytes(path, most, _REMEDY)
     marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
     try:
         text = content.decode(marks.get(content[:2], "utf-8-sig"))

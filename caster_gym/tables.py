@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from caster_gym.arrays import Array
+from caster_gym.brief import brief, cut
 from caster_gym.units import UNITS, read_unit
 
 LATEST_SECONDS = 10**11  # [s] a stamp beyond the year 5000 is one in ms, us or ns
 SPARSEST = 5.0  # [s] between many samples, from which on their times are hardly seconds
 _MANY = 20  # samples
+_LONGEST_HEADER = 400  # characters in a message
 DECIMAL_COMMA = re.compile(r"\s*[-+]?(\d+|\d{1,3}(\.\d{3})+),\d+([eE][-+]?\d+)?\s*")
 
 
@@ -55,6 +57,11 @@ class Table:
     rows: list[list[str]]
     lines: list[int]
     found: dict[str, Found] = field(default_factory=dict)
+
+    @property
+    def header(self) -> str:
+        """Names of the columns, of very many the first ones."""
+        return cut(", ".join(column.name for column in self.columns), _LONGEST_HEADER)
 
     def matched(self, quantities: Mapping[str, Quantity]) -> "Table":
         """The same table, with the columns found that hold the quantities.
@@ -119,7 +126,7 @@ class Table:
         if not math.isfinite(number):
             clock = "; write times in seconds" if re.search(r"\d:\d", cell) else ""
             name = self.columns[place].name
-            raise ValueError(f"{where}: {name!r} must be a finite number, got {cell.strip()!r}{clock}")
+            raise ValueError(f"{where}: {name!r} must be a finite number, got {brief(cell.strip())}{clock}")
         return number
 
     def times(self) -> tuple[Array, float]:
@@ -208,6 +215,6 @@ def refuse_decimal_comma(cell: str, where: str) -> None:
     """Refuse a number whose decimals stand behind a comma."""
     if DECIMAL_COMMA.fullmatch(cell):
         raise ValueError(
-            f"{where}: {cell.strip()!r} has a decimal comma; write decimal points, as in "
+            f"{where}: {brief(cell.strip())} has a decimal comma; write decimal points, as in "
             f"{cell.strip().replace('.', '').replace(',', '.')}"
         )

@@ -323,3 +323,16 @@ def test_of_many_problems_the_first_are_told_and_the_rest_counted():
     told = complaint(things=[{"kind": "pillar", "radius": -1.0}] * 50)
     assert "greater than 0" in told
     assert "and 42 more" in told
+
+
+def test_long_lists_are_refused_before_their_items_are_looked_at():
+    longest = Frozen.longest_list
+    assert complaint(grid=[[1.0]] * (longest + 1)) == f"'grid' has {longest + 1} items, at most {longest} are read"
+    assert complaint(weights={str(k): "a" for k in range(longest + 1)}).startswith("'weights' has 1001 items")
+    assert len(World.model_validate({"grid": [[1.0]] * longest}).grid) == longest
+
+
+def test_long_names_and_values_are_cut():
+    assert len(complaint(**{"k" * 5000: 1})) < 300
+    assert len(complaint(first={"kind": "k" * 5000})) < 300
+    assert len(complaint(size="k" * 5000)) < 300

@@ -175,5 +175,5 @@ def test_a_table_of_another_shape_and_one_with_holes_are_refused():
 
 def test_a_course_of_too_many_time_steps_is_refused():
     (course,) = build_courses("circle", ROBOT, 1.0)
-    with pytest.raises(ValueError, match="over 1000000 steps of 1e-06 s"):
+    with pytest.raises(ValueError, match="over 400000 steps of 1e-06 s"):
         course.trajectory(1e-6)

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym import load_robot
 from caster_gym.configuration import ConfigurationError
-from caster_gym.paths import build_trajectories, read_paths
+from caster_gym.paths import build_trajectories, files, read_paths
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.timed import Timed
 from caster_gym.tables import TableNote
@@ -220,3 +220,16 @@ def test_a_file_of_a_loop_in_degrees_turns_once():
 def test_the_file_of_a_mapping_may_be_a_path_object(tmp_path, shape, text):
     (by_object,) = read_paths({"shape": shape, "file": written(tmp_path, text)})
     assert by_object == read_paths({"shape": shape, "file": str(tmp_path / "path.csv")})[0]
+
+
+def test_points_are_bounded(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "MOST_POINTS", 2)
+    (tmp_path / "long.csv").write_text("x,y\n0,0\n1,0\n2,0\n")
+    with pytest.raises(ConfigurationError, match=r"long\.csv has 3 points, at most 2 are read; keep every tenth row"):
+        read_paths(tmp_path / "long.csv")
+
+
+def test_a_race_line_without_rows_is_told(tmp_path):
+    (tmp_path / "none.csv").write_text("x,y,psi\n")
+    with pytest.raises(ConfigurationError, match=r"none\.csv: column 'psi' may count from"):
+        read_paths(tmp_path / "none.csv")

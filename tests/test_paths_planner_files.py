@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym.configuration import ConfigurationError
-from caster_gym.paths import read_paths
+from caster_gym.paths import planner_files, read_paths
+from caster_gym.paths.planner_files import read_planner_file
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.timed import Timed
 from caster_gym.tables import TableNote
@@ -159,3 +160,32 @@ def test_a_path_without_times_is_no_timed_path(tmp_path):
     read(tmp_path, "a.path", path_planner())
     with pytest.raises(ConfigurationError, match="has no times; use it as a path of shape 'spline'"):
         read_paths({"shape": "timed", "file": str(tmp_path / "a.path")})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"samples": [3, 4]}', "is missing or of the wrong kind"),
+        ('{"samples": [{"t": 0, "x": "a", "y": 0, "heading": 0}, {}]}', "is missing or of the wrong kind"),
+        ('{"waypoints": [3, 4]}', "is missing or of the wrong kind"),
+        ('{"waypoints": [null, null]}', "is missing or of the wrong kind"),
+        ('{"samples": [{"t": NaN}]}', "cannot be read as JSON: NaN is no finite number"),
+        ('{"samples": [{"t": 1e999, "x": 0, "y": 0, "heading": 0}, {}]}', "is missing or of the wrong kind"),
+        ("[" * 50_000, "cannot be read as JSON: .*recursion"),
+    ],
+)
+def test_whatever_json_holds_is_told_with_its_file(tmp_path, text, said):
+    (tmp_path / "odd.json").write_text(text)
+    with pytest.raises(ConfigurationError, match=rf"odd\.json.*{said}"):
+        read_planner_file(tmp_path / "odd.json")
+
+
+def test_samples_and_waypoints_are_bounded(tmp_path, monkeypatch):
+    monkeypatch.setattr(planner_files, "MOST_POINTS", 32)
+    file = tmp_path / "long.json"
+    file.write_text(json.dumps([{"t": k, "x": 0, "y": 0, "heading": 0} for k in range(33)]))
+    with pytest.raises(ConfigurationError, match=r"long\.json has 33 samples, at most 32 are read"):
+        read_planner_file(file)
+    file.write_text(json.dumps({"waypoints": 3 * [{"anchor": {"x": 0, "y": 0}}]}))
+    with pytest.raises(ConfigurationError, match=r"long\.json has 3 waypoints, at most 2 are read"):
+        read_planner_file(file)

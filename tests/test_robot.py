@@ -360,3 +360,11 @@ def test_the_reach_holds_the_wheels_however_they_are_steered():
         far = max(far, np.hypot(*(wheel + caster.radius * f).T).max(), np.hypot(*(wheel - caster.radius * f).T).max())
     assert robot.reach >= far and robot.platform.footprint.polygon is not None
     assert robot.reach < 1.05 * max(far, *(np.hypot(*corner) for corner in robot.platform.footprint.polygon))
+
+
+def test_casters_are_not_endless():
+    """Every pair of them is compared."""
+    robot = load_robot("chung2008").model_dump()
+    robot["casters"] = [{**robot["casters"][0], "x": 0.1 * k} for k in range(201)]
+    with pytest.raises(ConfigurationError, match="'casters' should have at most 200 items"):
+        load_robot(robot)

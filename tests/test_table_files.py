@@ -2,6 +2,7 @@
 
 import pytest
 
+from caster_gym import table_files
 from caster_gym.table_files import read_table
 
 
@@ -110,3 +111,17 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
         read_table(tmp_path / "none.csv")
     with pytest.raises(ValueError, match="is a folder, not a file"):
         read_table(tmp_path)
+
+
+def test_lines_are_bounded_in_number_and_length(tmp_path, monkeypatch):
+    file = tmp_path / "points.csv"
+    monkeypatch.setattr(table_files, "MOST_LINES", 4)
+    for end in ("\n", "\r", "\r\n", "\x0b"):
+        file.write_text(f"x,y{end}1,2{end}3,4{end}5,6", newline="")
+        assert len(table_files.read_lines(file)) == 4
+        file.write_text(f"x,y{end}1,2{end}3,4{end}5,6{end}7,8", newline="")
+        with pytest.raises(ValueError, match=r"points\.csv has \d lines, at most 4 are read; keep every tenth row"):
+            read_table(file)
+    file.write_text(f"x,y\n1,{'2' * table_files.LONGEST_LINE}")
+    with pytest.raises(ValueError, match=r"line 2: it has 5002 characters, at most 5000 are read"):
+        read_table(file)

@@ -9,6 +9,7 @@ import typer
 from gymnasium.error import DependencyNotInstalled
 from tqdm import tqdm
 
+from caster_gym.brief import brief, cut
 from caster_gym.configuration import parse_yaml
 
 NOTHING_WRITTEN = "nothing was written"
@@ -52,8 +53,8 @@ def changes_of(options: list[str] | None) -> dict[str, Any]:
     for option in options or []:
         key, equals, value = option.partition("=")
         if not equals or not key:
-            raise ValueError(f"--set needs KEY=VALUE, got {option!r}")
-        parsed[key] = parse_yaml(value, f"--set {option}")
+            raise ValueError(f"--set needs KEY=VALUE, got {brief(option)}")
+        parsed[key] = parse_yaml(value, f"--set {cut(option)}")
         _check_colons(parsed[key], option)
     return parsed
 
@@ -63,7 +64,7 @@ def _check_colons(value: object, option: str) -> None:
     for key, inner in value.items() if isinstance(value, Mapping) else ():
         if inner is None and isinstance(key, str) and ":" in key:
             name, _, rest = key.partition(":")
-            raise ValueError(f"--set {option}: a colon needs a space after it, as in '{name}: {rest}'")
+            raise ValueError(f"--set {cut(option)}: a colon needs a space after it, as in '{name}: {rest}'")
         _check_colons(inner, option)
 
 

@@ -66,7 +66,7 @@ def choose_task(agent: str, task: str | None) -> ChosenTask:
     name = DEFAULT_TASK if task is None else task
     settings = read_settings(TaskSettings, "tasks", name)  # which may load code, as a file of the run must not
     run = _run_of(agent)
-    trained = None if run is None else _trained_on(run)
+    trained = None if run is None else task_of_run(run)
     if task is None and trained is not None:
         return ChosenTask(trained, f"Task {_named(trained) or f'of {run}'}, on which the policy was trained.")
     if trained is not None:
@@ -88,7 +88,7 @@ def _run_of(agent: str) -> Path | None:
     return next((one / RUN for one in above if (one / RUN).is_file()), None)
 
 
-def _trained_on(run: Path) -> TaskSettings | None:
+def task_of_run(run: Path) -> TaskSettings | None:
     """The task that a run.yaml records; None of one that is not that of a training run."""
     content = read_yaml(run)
     if "agent" not in content or not isinstance(content.get("task"), dict):

@@ -10,6 +10,7 @@ from caster_gym.agents.comparison.task_settings import in_brief
 from caster_gym.agents.control.own_controller import candidates_of, controller_of
 from caster_gym.agents.control.protocol import Agent, ControllerSettings
 from caster_gym.report.tables import write_csv
+from caster_gym.table_files import read_lines
 
 VALIDATION_SEED = 500
 
@@ -67,11 +68,13 @@ def write_history(path: Path, history: Sequence[Validation]) -> None:
 
 
 def read_history(path: Path, verdict: Any) -> list[Validation]:
-    """The validations of a training run on a task with these verdicts."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return [
-            Validation(
-                int(row["steps"]), float(row["seconds"]), verdict._make(float(row[name]) for name in verdict._fields)
-            )
-            for row in csv.DictReader(file)
-        ]
+    """The validations of a training run on a task with these verdicts. Raises ValueError that names the file."""
+    names, history = ("steps", "seconds", *verdict._fields), []
+    for number, row in enumerate(csv.DictReader(read_lines(path)), start=1):
+        try:
+            steps, seconds, *numbers = (float(row[name]) for name in names)
+            history.append(Validation(int(steps), seconds, verdict._make(numbers)))
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            wanted = f"row {number} should have a number for each of {', '.join(names)}"
+            raise ValueError(f"{path} is no history of a training run: {wanted}") from error
+    return history

@@ -19,6 +19,7 @@ from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
 from caster_gym.agents.learning.settings import MOST_LAYERS
 from caster_gym.agents.learning.weights import actor_shapes, read_weights
+from caster_gym.brief import brief
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.durable_files import replace_folder, scratch_folder, write_file
 from caster_gym.envs.observation import ObservationLayout
@@ -162,7 +163,8 @@ def load_policy(folder: str | Path) -> Bundle:
     content = read_yaml(folder / DESCRIPTION)
     if content.get("format") != FORMAT:
         raise ConfigurationError(
-            f"{folder / DESCRIPTION} has format {content.get('format')!r}; this version of caster_gym reads {FORMAT}"
+            f"{folder / DESCRIPTION} has format {brief(content.get('format'))}; this version of caster_gym reads "
+            f"{FORMAT}"
         )
     refuse_imports(content.get("environment"), str(folder / DESCRIPTION))
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))

@@ -16,12 +16,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load
 
 from caster_gym.bounded_files import WEIGHTS_BYTES, read_bytes
+from caster_gym.brief import brief, cut
 from caster_gym.configuration import ConfigurationError
 
 Shapes = Mapping[str, tuple[int, ...]]
 
 _LENGTH = 8  # [bytes] of the number in front of the header, least significant first
-_SHOWN = 80  # characters of a value in a message
 _HEADER_BYTES = 1 << 20  # that of an actor with 30 layers has 6,000
 
 
@@ -44,12 +44,12 @@ def read_weights(path: Path, wanted: Shapes) -> dict[str, torch.Tensor]:
         raise ConfigurationError(str(error)) from error
     found = _header(path, content)
     for name in sorted(wanted.keys() ^ found.keys()):
-        raise ConfigurationError(f"{path}: weight {_brief(name)} is {'missing' if name in wanted else 'not known'}")
+        raise ConfigurationError(f"{path}: weight {brief(name)} is {'missing' if name in wanted else 'not known'}")
     for name, shape in wanted.items():
         kind, given = found[name].get("dtype"), found[name].get("shape")
         if kind != "F32" or given != list(shape):
             raise ConfigurationError(
-                f"{path}: weight {name!r} must be {list(shape)} of type 'F32', got {_brief(given)} of {_brief(kind)}"
+                f"{path}: weight {name!r} must be {list(shape)} of type 'F32', got {brief(given)} of {brief(kind)}"
             )
     size = 4 * sum(map(prod, wanted.values()))
     if len(content) - _LENGTH - int.from_bytes(content[:_LENGTH], "little") != size:
@@ -57,7 +57,7 @@ def read_weights(path: Path, wanted: Shapes) -> dict[str, torch.Tensor]:
     try:
         weights = load(content)
     except SafetensorError as error:
-        raise ConfigurationError(f"{path} holds no weights: {error}") from error
+        raise ConfigurationError(f"{path} holds no weights: {cut(str(error))}") from error
     for name, tensor in weights.items():
         if not torch.isfinite(tensor).all():
             raise ConfigurationError(f"{path}: weight {name!r} holds numbers that are not finite")
@@ -78,8 +78,3 @@ def _header(path: Path, content: bytes) -> dict[str, Mapping[str, Any]]:
         raise ConfigurationError(f"{path} holds no weights: its header does not describe tensors")
     del tensors["__metadata__"]
     return tensors
-
-
-def _brief(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import field_validator
 
-from caster_gym.configuration import parse, read_yaml
+from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.design.figures import write_design_figure
 from caster_gym.design.region import DesignTarget, check_designable
 from caster_gym.design.search import Design, optimise
@@ -97,7 +97,10 @@ def read_design(
     given = {**(changes or {}), **({} if robot is None else {"robot": robot})}
     source = f"{path}, as changed" if given else str(path)
     settings = parse(DesignSettings, {**read_yaml(path), **from_working_folder(given)}, source, path.parent)
-    check_designable(load_robot(settings.robot), settings)
+    try:
+        check_designable(load_robot(settings.robot), settings)
+    except ValueError as error:
+        raise ConfigurationError(f"{source}: {error}") from error
     return settings
 
 

@@ -22,7 +22,7 @@ from caster_gym.design.envelope import (
     together,
 )
 from caster_gym.design.target import Target, check_actuation, check_conditioning, driven_as, loaded
-from caster_gym.paths.trajectory import Trajectory
+from caster_gym.paths.trajectory import MOST_STEPS, Trajectory
 from caster_gym.robot import Robot
 
 _STARTS, _ROUNDS, _TRIES = 4, 24, 24  # of the search for harder motions around the hardest of so many parts
@@ -75,6 +75,9 @@ class Requirement:
 
 def trajectories_of(target: Target) -> tuple[Trajectory, ...]:
     """The timed trajectories of the target's paths. Raises ValueError for a path that cannot be timed."""
+    steps = sum(getattr(path, "count", 1) * path.duration / target.time_step for path in target.paths)
+    if steps > MOST_STEPS:
+        raise ValueError(f"the paths take {steps:.3g} time steps together, at most {MOST_STEPS} are looked at")
     return tuple(one for path in target.paths for one in path.trajectories(target.time_step))
 
 

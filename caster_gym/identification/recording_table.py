@@ -87,7 +87,7 @@ def _refuse_missing(table: Table, robot: Robot, needed: list[str]) -> None:
         hint = "; 'psi' is counted from the x-axis by some and from north by others: call it 'heading' if it is from x"
     raise ValueError(
         f"{table.source}: the columns {', '.join(map(repr, missing))} are missing, for robot {robot.name!r} of "
-        f"{robot.caster_count} casters; the header names {', '.join(column.name for column in table.columns)}{hint}"
+        f"{robot.caster_count} casters; the header names {table.header}{hint}"
     )
 
 

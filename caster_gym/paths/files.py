@@ -13,7 +13,7 @@ import numpy as np
 from caster_gym.arrays import Array
 from caster_gym.configuration import ConfigurationError
 from caster_gym.paths.angles import AngleUnit, ZeroAxis, degrees_by_mistake, unwrapped
-from caster_gym.paths.planner_files import PLANNER_SUFFIXES, read_planner_file
+from caster_gym.paths.planner_files import MOST_POINTS, PLANNER_SUFFIXES, read_planner_file
 from caster_gym.table_files import TABLE_SUFFIXES, read_table
 from caster_gym.tables import Quantity, Table, note, note_left_out
 from caster_gym.units import unlikely_radians
@@ -95,6 +95,10 @@ def _table_of(path: Path) -> Table:
         table = read_table(path).matched(_QUANTITIES)
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
+    if len(table.rows) > MOST_POINTS:
+        raise ConfigurationError(
+            f"{path} has {len(table.rows)} points, at most {MOST_POINTS} are read; keep every tenth row, or a part"
+        )
     missing = [axis for axis in "xy" if axis not in table.found]
     if missing:
         if any(column.name.strip().casefold() in _DEGREES_OF_EARTH for column in table.columns):
@@ -105,7 +109,7 @@ def _table_of(path: Path) -> Table:
         names = ", ".join(POINT["x"].names[:4])
         raise ConfigurationError(
             f"{path}: no column is called {' or '.join(map(repr, missing))}; the header names "
-            f"{', '.join(column.name for column in table.columns)}; call the coordinates x and y (or as {names} is)"
+            f"{table.header}; call the coordinates x and y (or as {names} is)"
         )
     return table
 
@@ -201,7 +205,7 @@ def _turn_of_psi(points: Array, psi: Array, zero_axis: ZeroAxis | None, column: 
     turns = {"x": 0.0, "y": 0.5 * np.pi}
     if zero_axis is not None:
         return turns[zero_axis]
-    way = np.gradient(points[:, 0] + 1j * points[:, 1]) if len(points) > 1 else np.zeros(1, dtype=np.complex128)
+    way = np.gradient(points[:, 0] + 1j * points[:, 1]) if len(points) > 1 else 0j * psi
     moving = np.abs(way) > 0.0
     ahead = np.exp(1j * psi[moving]) * way[moving].conj()
     misses = {axis: float(np.mean(np.abs(np.angle(ahead * np.exp(1j * turn))))) for axis, turn in turns.items()}

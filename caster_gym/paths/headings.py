@@ -11,6 +11,7 @@ from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import ConfigurationError, Frozen
 from caster_gym.paths.angles import AngleUnit, plain_lists, read_angle, read_angles
 from caster_gym.paths.naming import unknown_name
+from caster_gym.paths.points import check_long
 from caster_gym.paths.rounding import HEADING_UNITS, headings_note, rounding
 
 _EIGHTH = 45.0  # [deg] numbers of revolutions that are twice that or more, and multiples of it, are degrees
@@ -91,6 +92,7 @@ class Spinning(_Kind):
 class Profile(_Kind):
     """Through given angles, smoothly."""
 
+    longest_list: ClassVar[int] = 100_000
     kind: Literal["profile"] = "profile"
     # [rad] or `unit`, not wrapped: 6.283 is a turn away from 0
     angles: Annotated[tuple[float, ...], Field(min_length=2)]
@@ -106,6 +108,8 @@ class Profile(_Kind):
         angles = plain_lists(content.get("angles")) if isinstance(content, Mapping) else None
         if not isinstance(angles, list):
             return content
+        check_long(angles, "angle")
+        check_long(content.get("progress"), "progress")
         turned, unit = read_angles(angles, content.get("unit"), "an angle")
         return {**{key: value for key, value in content.items() if key != "unit"}, "angles": turned, **unit}
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from caster_gym.bounded_files import PLANNED_BYTES
+from caster_gym.brief import cut
 from caster_gym.configuration import ConfigurationError
 from caster_gym.table_files import read_text
 from caster_gym.tables import note
@@ -14,6 +16,7 @@ from caster_gym.units import unlikely_radians
 
 PLANNER_SUFFIXES = (".json", ".path", ".traj")
 
+MOST_POINTS = 30_000  # ten minutes at 50 Hz
 _POINTS = 16  # of each Bézier curve, through which the spline goes
 
 
@@ -23,23 +26,33 @@ def read_planner_file(path: Path) -> dict[str, Any]:
     Raises ConfigurationError that names the file and says what is missing.
     """
     try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise ConfigurationError(f"{path}, line {error.lineno}: cannot be read as JSON: {error.msg}") from error
+        text = read_text(path, PLANNED_BYTES)
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise ConfigurationError(f"{path}, line {error.lineno}: cannot be read as JSON: {error.msg}") from error
+    except (ValueError, RecursionError) as error:  # of numbers without end, and of lists in lists in lists
+        raise ConfigurationError(f"{path} cannot be read as JSON: {error}") from error
     samples = _samples(content)
     try:
         if samples is not None:
             return _timed(samples, path)
         if isinstance(content, dict) and isinstance(content.get("waypoints"), list):
             return _bezier(content, path)
-    except (KeyError, TypeError, IndexError) as error:
-        raise ConfigurationError(f"{path}: {error} is missing or of the wrong kind in it") from error
+    except ConfigurationError:
+        raise
+    except (KeyError, TypeError, IndexError, AttributeError, ValueError, ArithmeticError) as error:
+        raise ConfigurationError(f"{path}: {cut(str(error))} is missing or of the wrong kind in it") from error
     raise ConfigurationError(
         f"{path} is none of the JSON files that are known: a list of states with time and pose (WPILib), samples with "
         f"t, x, y and heading (Choreo), waypoints with anchors (PathPlanner)"
     )
+
+
+def _refuse_constant(word: str) -> None:
+    raise ValueError(f"{word} is no finite number")
 
 
 def _samples(content: Any) -> list[Any] | None:
@@ -59,6 +72,8 @@ def _samples(content: Any) -> list[Any] | None:
 def _timed(samples: list[Any], path: Path) -> dict[str, Any]:
     if len(samples) < 2:
         raise ConfigurationError(f"{path} has {len(samples)} samples; generate the trajectory before it is exported")
+    if len(samples) > MOST_POINTS:
+        raise ConfigurationError(f"{path} has {len(samples)} samples, at most {MOST_POINTS} are read")
     poses = np.array([_pose(sample) for sample in samples], dtype=np.float64)
     poses[:, 0] -= poses[0, 0]
     poses[:, 3] = np.unwrap(poses[:, 3])
@@ -83,6 +98,8 @@ def _bezier(content: dict[str, Any], path: Path) -> dict[str, Any]:
     waypoints = content["waypoints"]
     if len(waypoints) < 2:
         raise ConfigurationError(f"{path} has {len(waypoints)} waypoints; a path needs at least two")
+    if len(waypoints) * _POINTS > MOST_POINTS:
+        raise ConfigurationError(f"{path} has {len(waypoints)} waypoints, at most {MOST_POINTS // _POINTS} are read")
     anchors = [_point(waypoint.get("anchor") or waypoint["anchorPoint"]) for waypoint in waypoints]
     u = np.arange(_POINTS) / _POINTS
     parts = []

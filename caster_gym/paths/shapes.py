@@ -2,10 +2,10 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
-from typing import ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import PositiveInt, model_validator
+from pydantic import Field, model_validator
 
 from caster_gym.arrays import Array, Plane
 from caster_gym.configuration import Frozen, Positive
@@ -35,7 +35,7 @@ class Shape(Frozen):
 
     shape: str
     duration: Positive = 10.0  # [s] of all laps together, rounded to whole time steps
-    laps: PositiveInt = 1
+    laps: Annotated[int, Field(gt=0, le=1000)] = 1
     heading: Heading = Tangent()
     centre: tuple[float, float] = (0.0, 0.0)  # [m] where the origin of the shape lies, in the world
     rotation: Rotation = 0.0  # [rad] of the whole path about that point, headings included

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from caster_gym.bounded_files import expanded
-from caster_gym.configuration import LONGEST_VALUE, ConfigurationError, is_yaml, parse, read_yaml
+from caster_gym.brief import LONGEST_VALUE
+from caster_gym.configuration import ConfigurationError, is_yaml, parse, read_yaml
 from caster_gym.paths.advice import timed_remedy
 from caster_gym.paths.angles import plain_lists
 from caster_gym.paths.feasibility import check_feasible

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
@@ -11,8 +11,9 @@ from pydantic import Field, NonNegativeFloat, model_validator
 from caster_gym.arrays import Array
 from caster_gym.paths.angles import AngleUnit, ZeroAxis, plain_lists, read_angles
 from caster_gym.paths.headings import Fixed, Heading, Slopes, Tangent
+from caster_gym.paths.points import check_long
 from caster_gym.paths.shapes import SIZES, Shape
-from caster_gym.paths.trajectory import LEAST_STEPS, Trajectory, rounded_down, whole_steps
+from caster_gym.paths.trajectory import LEAST_STEPS, MOST_STEPS, Trajectory, rounded_down, whole_steps
 from caster_gym.paths.walks import MOST_ROUNDED, Walk
 from caster_gym.paths.waypoints import SAME_PLACE, Track, Turns, read_track
 
@@ -30,6 +31,7 @@ class Spline(Shape):
     single place keep the robot there. Other repeated waypoints say nothing: a stay at a place needs times.
     """
 
+    longest_list: ClassVar[int] = MOST_STEPS
     shape: Literal["spline"] = "spline"
     # (x, y) [m] or (x, y, heading) [m, m, rad or `unit`]
     waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]
@@ -61,6 +63,7 @@ class Spline(Shape):
 
             return {**read_waypoints(file, unit, zero_axis, content.get("heading") is None), **rest, "file": str(file)}
         waypoints = plain_lists(content.get("waypoints"))
+        check_long(waypoints, "waypoint", (2, 3))
         if not isinstance(waypoints, list) or not all(isinstance(one, list) and len(one) == 3 for one in waypoints):
             return content if waypoints is None else {**content, "waypoints": waypoints}
         angles, kept = read_angles([one[2] for one in waypoints], content.get("unit"), "a heading")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
@@ -11,6 +11,7 @@ from caster_gym.arrays import Array
 from caster_gym.configuration import Frozen, Positive
 from caster_gym.paths.angles import AngleUnit, Rotation, ZeroAxis, plain_lists, read_angles, unwrapped
 from caster_gym.paths.in_between import motion_between, room_for
+from caster_gym.paths.points import check_long
 from caster_gym.paths.splines import Spline
 from caster_gym.paths.trajectory import (
     LEAST_STEPS,
@@ -36,6 +37,7 @@ class Timed(Frozen):
     at both ends and wherever two poses in succession are the same.
     """
 
+    longest_list: ClassVar[int] = MOST_STEPS + 1
     shape: Literal["timed"] = "timed"
     # (time, x, y) [s, m, m] or (time, x, y, heading) [s, m, m, rad or `unit`], in ascending order
     poses: Annotated[tuple[TimedPose, ...], Field(min_length=2)]
@@ -64,6 +66,8 @@ class Timed(Frozen):
             rest = {key: value for key, value in content.items() if key != "unit"}
             return {**rest, **found, "file": str(content["file"])}
         poses = plain_lists(content.get("poses"))
+        check_long(poses, "pose", (3, 4))
+        check_long(content.get("rates"), "rates of pose", (6,))
         if not isinstance(poses, list) or not all(isinstance(pose, list) and len(pose) == 4 for pose in poses):
             return {**content, "poses": poses} if poses is not None else content
         angles, unit = read_angles([pose[3] for pose in poses], content.get("unit"), "a heading")

@@ -12,7 +12,7 @@ from caster_gym.arrays import Array, Plane
 COLUMNS = ("x", "y", "cos", "sin", "vx", "vy", "omega", "ax", "ay", "alpha")
 MOST_TURN = 1.0  # [rad] of the heading in one time step
 LEAST_STEPS = 10  # fewer samples do not show a motion that starts and ends at rest
-MOST_STEPS = 1_000_000  # beyond, a table would fill the memory
+MOST_STEPS = 400_000  # more than two hours at 20 ms; making the table then takes 200 MB
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,9 @@ from caster_gym.configuration import Frozen, Positive
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 from caster_gym.floor import Floor
 
-Horizons: TypeAlias = tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...]
+MOST_HORIZONS = 64  # each of them is compiled
+
+Horizons: TypeAlias = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1000.0)], ...], Field(max_length=MOST_HORIZONS)]
 Turn: TypeAlias = Annotated[float, Field(ge=0.0, le=3.1416)]  # [rad] either way
 
 
