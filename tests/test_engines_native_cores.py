@@ -8,7 +8,7 @@ import warnings
 import pytest
 
 from caster_gym.engines.native import cores
-from caster_gym.engines.native.cores import default_threads, usable_cores
+from caster_gym.engines.native.cores import default_threads, learning_threads, usable_cores
 
 
 @pytest.fixture
@@ -116,3 +116,11 @@ def test_what_is_no_number_of_threads_is_ignored_aloud(eight, tmp_path, monkeypa
 def test_a_quota_comes_before_openmp(eight, tmp_path, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     assert default_threads(unified(tmp_path, "/", {"": "200000 100000\n"})) == 2
+
+
+@pytest.mark.parametrize(("openmp", "count"), [(None, 1), ("1", 1), ("3", 3), ("4,2", 4), ("", 1)])
+def test_learning_takes_one_thread_unless_the_environment_says_otherwise(eight, monkeypatch, openmp, count):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    if openmp is not None:
+        monkeypatch.setenv("OMP_NUM_THREADS", openmp)
+    assert learning_threads() == count

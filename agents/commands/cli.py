@@ -8,6 +8,7 @@ import typer
 
 import caster_gym
 from caster_gym.agents.commands.command_line import (
+    DEFAULT_THREADS,
     NOTHING_WRITTEN,
     PARTS_BAR,
     Changes,
@@ -64,7 +65,7 @@ def train(
     overwrite: Overwrite = False,
     resume: Resume = False,
     change: Changes = None,
-    threads: Threads = 1,
+    threads: Threads = DEFAULT_THREADS,
 ) -> None:
     """Train a policy. Save the one that is best on the validation paths in OUT/best, for `evaluate` and `watch`."""
     with plain_errors():
@@ -102,7 +103,7 @@ def evaluate(
     starts: Annotated[int, typer.Option(help="Episodes on each test path.", min=1)] = 1,
     out: Out = Path("runs/evaluate"),
     overwrite: Overwrite = False,
-    threads: Threads = 1,
+    threads: Threads = DEFAULT_THREADS,
 ) -> None:
     """Evaluate an agent on the test paths of a task. Write a table, all episodes as CSV, and figures."""
     with plain_errors():
@@ -120,7 +121,7 @@ def benchmark(
     overwrite: Overwrite = False,
     resume: Resume = False,
     change: Changes = None,
-    threads: Threads = 1,
+    threads: Threads = DEFAULT_THREADS,
 ) -> None:
     """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
     with plain_errors():

@@ -11,11 +11,13 @@ from tqdm import tqdm
 
 from caster_gym.brief import brief, cut
 from caster_gym.configuration import parse_yaml
+from caster_gym.engines.native.cores import learning_threads
 
 NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 MOST_THREADS = 1024  # far more make systems refuse memory that is there
 LONGEST_MESSAGE = 1000  # characters
+DEFAULT_THREADS = learning_threads()
 
 Out = Annotated[Path, typer.Option(help="Folder for the results. It must be empty or not exist yet.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete the contents of that folder first.")]
@@ -42,7 +44,8 @@ Threads = Annotated[
     typer.Option(
         min=1,
         max=MOST_THREADS,
-        help="Threads per process, for networks and simulation. Results depend on this number.",
+        help="Threads per process, for networks and simulation. Results depend on this number. "
+        "OMP_NUM_THREADS sets the default.",
     ),
 ]
 

@@ -3,13 +3,10 @@
 With the same settings, seed, number of threads and versions on the same machine, a training run repeats bit for bit.
 """
 
-import multiprocessing
-import queue
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tqdm import tqdm
 
@@ -20,6 +17,8 @@ from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS
 from caster_gym.agents.learning.resuming import best_of, is_completed
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training_run import Report, Run
+from caster_gym.agents.workers.calls import Call, Reported
+from caster_gym.agents.workers.local import LocalWorkers
 from caster_gym.durable_files import MARK, FolderLock
 from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
@@ -110,29 +109,12 @@ def train_all(jobs: Sequence[Job], threads: int = DEFAULT, resume: bool = False)
     """
     if not jobs:
         return
-    workers = max(1, min(len(jobs), usable_cores() // threads))
-    context = multiprocessing.get_context("spawn")
-    with context.Manager() as manager, _bar(jobs) as show:
-        reports = manager.Queue()
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            futures = [pool.submit(_train_job, i, job, threads, resume, reports) for i, job in enumerate(jobs)]
-            try:
-                while not all(future.done() for future in futures):
-                    _raise_errors(futures)
-                    try:
-                        show(*reports.get(timeout=0.5))
-                    except queue.Empty:
-                        continue
-                _raise_errors(futures)
-            except BaseException:
-                pool.shutdown(wait=True, cancel_futures=True)
-                raise
-
-
-def _raise_errors(futures: Sequence["Future[None]"]) -> None:
-    for future in futures:
-        if future.done():
-            future.result()
+    with LocalWorkers(max(1, min(len(jobs), usable_cores() // threads))) as workers, _bar(jobs) as show:
+        for job in jobs:
+            workers.submit(Call(job.name, _train_job, (job, threads, resume)))
+        for event in workers.events():
+            if isinstance(event, Reported):
+                show(event.number, *event.content)
 
 
 @contextmanager
@@ -151,9 +133,6 @@ def _bar(jobs: Sequence[Job]) -> Iterator[Callable[[int, int, str], None]]:
         yield show
 
 
-def _train_job(index: int, job: Job, threads: int, resume: bool, reports: Any) -> None:
-    def report(steps: int, verdict: str) -> None:
-        reports.put((index, steps, verdict))
-
-    best = train(job.task, job.agent, job.seed, job.folder, report, threads, resume)
-    report(job.agent.n_timesteps, in_words(best.verdict))
+def _train_job(job: Job, threads: int, resume: bool, report: Callable[[tuple[int, str]], None]) -> None:
+    best = train(job.task, job.agent, job.seed, job.folder, lambda *progress: report(progress), threads, resume)
+    report((job.agent.n_timesteps, in_words(best.verdict)))

@@ -27,13 +27,18 @@ def default_threads(root: Path = _ROOT) -> int:
     return min(cores, _number("OMP_NUM_THREADS", cores) or cores)
 
 
+def learning_threads() -> int:
+    """Threads for learning and evaluating: OMP_NUM_THREADS, else one, see `caster_gym.engines.tensor.threads`."""
+    return _number("OMP_NUM_THREADS", 1) or 1
+
+
 def _affinity() -> int:
     if hasattr(os, "process_cpu_count"):  # Python 3.13, which knows PYTHON_CPU_COUNT too
         return os.process_cpu_count() or 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _number(name: str, cores: int) -> int | None:
+def _number(name: str, otherwise: int) -> int | None:
     """Value of a variable of the environment, if it is a number of threads; else a warning says what is done."""
     given = os.environ.get(name, "")
     first = given.split(",")[0].strip()
@@ -41,7 +46,7 @@ def _number(name: str, cores: int) -> int | None:
         return int(first)
     if given.strip():
         warnings.warn(
-            f"{name} must be a number of threads such as 4, got {given!r}; it is ignored, {cores} may be used",
+            f"{name} must be a number of threads such as 4, got {given!r}; it is ignored, {otherwise} may be used",
             RuntimeWarning,
             stacklevel=2,
         )

@@ -1,4 +1,6 @@
-"""The number of threads for learning and evaluation: one, unless the user chooses more.
+"""The number of threads for learning and evaluation: one, unless the user chooses another.
+
+Users choose by --threads or by OMP_NUM_THREADS, which is read when this module is imported, as OpenMP does.
 
 Networks and batches are so small here that a second thread gains little on a machine at rest, and beside another busy
 process the two wait for each other most of the time. Sums depend on how they are shared out, so that a training run
@@ -10,9 +12,10 @@ from contextlib import contextmanager
 
 import torch
 
+from caster_gym.engines.native.cores import learning_threads
 from caster_gym.engines.native.threads import get_threads, set_threads
 
-DEFAULT = 1
+DEFAULT = learning_threads()
 
 
 @contextmanager

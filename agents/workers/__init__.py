@@ -1,0 +1,1 @@
+"""Other processes that work: on this machine, or on a cluster."""
