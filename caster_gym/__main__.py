@@ -5,6 +5,7 @@ from importlib import import_module
 from importlib.util import find_spec
 
 import caster_gym
+from caster_gym.processes import exit_code, interruptible
 
 NEEDED = ("typer", "tqdm")  # of the extra `train`, whatever the command
 
@@ -17,10 +18,11 @@ def main() -> None:
             return
         sys.exit(_refuse(missing))
     try:
-        app = import_module("caster_gym.agents.commands.cli").app
-    except KeyboardInterrupt:  # afterwards each command says what is left
+        with interruptible():
+            app = import_module("caster_gym.agents.commands.cli").app
+    except KeyboardInterrupt as error:  # afterwards each command says what is left
         print("caster-gym: interrupted; nothing was written", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(exit_code(error))
     app(prog_name="caster-gym")
 
 

@@ -19,7 +19,12 @@ from scripts.speed_timing import RATE, middle, shown
 
 COUNTS = (1, 2)  # of threads
 PAIRS = 5
-SPIN = "while True: pass"
+SPIN = """
+import os, sys, threading
+threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+while True:
+    pass
+"""  # until the process that holds the other end of its input has ended
 
 
 class Round(NamedTuple):
@@ -45,13 +50,13 @@ class Beside(NamedTuple):
 @contextmanager
 def busy_processes(count: int) -> Iterator[None]:
     """So many processes that compute without end, each on one core."""
-    processes = [subprocess.Popen([sys.executable, "-c", SPIN]) for _ in range(count)]
+    processes = [subprocess.Popen([sys.executable, "-c", SPIN], stdin=subprocess.PIPE) for _ in range(count)]
     try:
         yield
     finally:
         for one in processes:
             one.kill()
-            one.wait()
+            one.communicate()
 
 
 def train_beside(learner: BaseAlgorithm, periods: int, pairs: int = PAIRS) -> Beside:

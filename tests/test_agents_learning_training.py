@@ -2,6 +2,10 @@
 
 import csv
 import inspect
+import os
+import signal
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,11 +26,13 @@ from caster_gym.agents.learning.training import train
 from caster_gym.agents.learning.training_run import Run
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import parse
+from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.native.threads import get_threads
 from caster_gym.engines.tensor.threads import DEFAULT
 from caster_gym.own_errors import OwnCodeError
 from caster_gym.shipped_files import read_settings
 from caster_gym.tasks.track.metrics import TrackVerdict, measure
+from tests.kills import LONGEST, on_linux, session_of, wait_until
 
 HELD_OUT_SEED = 7
 TINY: dict[str, Any] = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2}
@@ -250,3 +256,49 @@ def test_what_a_learner_of_ones_own_raises_names_it_with_its_file_and_line(tmp_p
     line = inspect.getsourcelines(Broken.learn)[1] + 1
     where = f"{__file__}, line {line}"
     assert str(caught.value) == f"agent 'search:Broken': its method learn: KeyError: 'no such layer' ({where})"
+
+
+TRAIN_TWO = """
+import sys
+from pathlib import Path
+import typer
+from caster_gym.agents.commands.command_line import plain_errors
+from caster_gym.agents.learning.training import Job, train_all
+from tests.test_agents_learning_training import PPO, TASK
+
+def main(folder: Path) -> None:
+    endless = PPO.model_copy(update={"n_timesteps": 10**9})
+    with plain_errors():
+        train_all([Job(f"ppo seed {seed}", TASK, endless, seed, folder / str(seed)) for seed in range(5)])
+
+if __name__ == "__main__":
+    typer.run(main)
+"""
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_training_processes_end_with_their_command(tmp_path, number):
+    """Told by SIGTERM, they keep what they have learned; killed with the command, they leave what they have written."""
+    (tmp_path / "train.py").write_text(TRAIN_TWO, encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "train.py"), str(tmp_path / "runs")]
+    paths = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    with subprocess.Popen(command, start_new_session=True, env=paths, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            least = 0 if number == signal.SIGKILL else 1
+            wait_until(lambda: any(one.stat().st_size >= least for one in tmp_path.glob("runs/*/progress.csv")))
+            process.send_signal(number)
+            _, errors = process.communicate(timeout=LONGEST)
+            wait_until(lambda: session_of(process) == [])
+        finally:
+            for one in session_of(process):
+                os.kill(one, signal.SIGKILL)
+    begun = list(tmp_path.glob("runs/*/progress.csv"))
+    assert len(begun) <= usable_cores()  # those that waited have not been begun
+    if number == signal.SIGTERM:
+        assert (process.returncode, errors.splitlines()[-1]) == (
+            143,
+            "caster-gym: interrupted; what was finished is kept",
+        )
+        assert any(load_policy(file.parent / "best").description.trained_with["steps"] > 0 for file in begun)

@@ -12,6 +12,7 @@ from tqdm import tqdm
 from caster_gym.brief import brief, cut
 from caster_gym.configuration import parse_yaml
 from caster_gym.engines.native.cores import learning_threads
+from caster_gym.processes import exit_code, interruptible
 
 NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
@@ -99,9 +100,10 @@ def progress(**options: Any) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def plain_errors(interrupted: str = "what was finished is kept") -> Iterator[None]:
-    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C that says what is left."""
+    """Errors of the user's making as one sentence, and a quiet end on Ctrl-C or SIGTERM that says what is left."""
     try:
-        yield
+        with interruptible():
+            yield
     except OSError as error:
         if error.filename and error.strerror:  # else the message is a sentence already
             refuse(f"{error.filename}: {error.strerror.lower()}", error)
@@ -118,9 +120,9 @@ def plain_errors(interrupted: str = "what was finished is kept") -> Iterator[Non
         if (error.name or "").startswith("caster_gym"):
             raise
         refuse(f"this needs the Python package {error.name!r}: pip install 'caster_gym[train]'", error)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         typer.echo(f"caster-gym: interrupted; {interrupted}", err=True)
-        raise typer.Exit(130) from None
+        raise typer.Exit(exit_code(error)) from None
 
 
 def refuse(message: str, error: BaseException) -> NoReturn:

@@ -1,9 +1,7 @@
 """Workers on this machine: processes that end with the one that has started them, however that ends."""
 
 import multiprocessing
-import os
 import signal
-import threading
 from collections import Counter, deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,6 +11,7 @@ from types import TracebackType
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from caster_gym.agents.workers.calls import ATTEMPTS, Call, Finished, Reported, Workers, lost, named, portable
+from caster_gym.processes import end_with_parent
 
 Message: TypeAlias = tuple[Literal["reported", "finished", "failed"], Any]
 
@@ -128,14 +127,7 @@ def _without_interrupts() -> Iterator[None]:
 
 def _work(connection: "Connection[Message, Any]") -> None:
     """What a worker process does until its parent has no more calls, interrupts it, or is gone."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def end_with_parent() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _interrupt)
     with suppress(EOFError, OSError, KeyboardInterrupt):
