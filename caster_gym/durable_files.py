@@ -30,6 +30,7 @@ _NO_SUCH_OPERATION = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUP
 _AT_FDCWD, _EXCHANGE, _SWAP = -100, 2, 2  # of <fcntl.h>, <linux/fs.h> and Darwin's <sys/stdio.h>
 _LOCKED_BYTE = 1 << 30  # on Windows nobody can read what is locked: far behind the holder's number
 _LOOK_AGAIN = 0.05  # [s]
+PATIENCE = 1.0  # [s] that a process which has just been killed may still take to end
 
 
 def write_file(path: Path, content: bytes | str) -> None:
@@ -139,13 +140,13 @@ class FolderLock:
 
     The lock is on the folder's mark, which is made if it is not there. One thread may lock a folder several times.
 
-    patience: [s] to wait for somebody else to end, such as a process that has just been killed.
+    patience: [s] to wait for somebody else to end.
     Raises FolderInUseError, which says who uses the folder.
     """
 
     _holders: ClassVar[dict[tuple[int, int], int]] = {}  # threads, by the mark that they have locked
 
-    def __init__(self, folder: Path, patience: float = 0.0) -> None:
+    def __init__(self, folder: Path, patience: float = PATIENCE) -> None:
         self._folder, self._patience = folder, patience
         self._handle: int | None = None
 

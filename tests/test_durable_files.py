@@ -207,7 +207,10 @@ def test_a_lock_keeps_others_out_and_ends_with_its_process(folder):
     command = [sys.executable, "-c", HOLD, str(folder)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout is not None and other.stdout.readline() == b"locked\n"
-        with pytest.raises(FolderInUseError, match=f"{folder} is in use by process {other.pid}: "), FolderLock(folder):
+        with (
+            pytest.raises(FolderInUseError, match=f"{folder} is in use by process {other.pid}: "),
+            FolderLock(folder, 0.0),
+        ):
             pass
         other.kill()
     with FolderLock(folder, patience=10.0):  # the system may still be at the dead process
@@ -220,7 +223,7 @@ def test_one_thread_may_lock_a_folder_again_and_another_may_not(folder):
 
     def attempt():
         try:
-            with FolderLock(folder):
+            with FolderLock(folder, patience=0.0):
                 pass
         except FolderInUseError as error:
             refused.append(str(error))

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from caster_gym.envs.tensor.task import TorchTask
 from tests.test_envs_floor import ISLANDS, OBSTACLES
+from tests.test_envs_tensor_task import SMALL
 from tests.test_envs_tensor_vector_env import assert_same_episodes, both, random_actions
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
@@ -87,9 +88,9 @@ def test_gradients_pass_and_are_those_of_differences(dtype):
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["_move", "_look", "_place"])
 def test_each_part_is_one_graph_for_the_compiler_on_every_floor(part):
-    task = TorchTask("track", path=CIRCLE, floor=ISLANDS, dtype=torch.float64)
+    task = TorchTask("track", path=CIRCLE, floor=ISLANDS, dtype=torch.float64, **SMALL)
     state, _ = task.begin(torch.arange(3))
-    actions = torch.full((3, 6), 0.3)
+    actions = torch.full((3, 4), 0.3)
     expected, _ = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
     setattr(task, part, torch.compile(getattr(task, part), fullgraph=True, backend="eager", dynamic=False))
     seen, _ = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))

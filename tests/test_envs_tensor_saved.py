@@ -46,9 +46,8 @@ ARENA = {"beside": {"pillars": 3, "walls": 2, "gap": [0.01, 0.02]}}
         {"dtype": torch.float64, "diagnostics": False},
         {"task": "follow", "arena": ARENA},
         {"floor": {"friction": 0.3}},
-        pytest.param({"compile": True}, marks=pytest.mark.slow),
     ],
-    ids=["float32", "float64", "obstacles", "floor", "compiled"],
+    ids=["float32", "float64", "obstacles", "floor"],
 )
 def test_a_fresh_batch_goes_on_from_arrays(arguments):
     batch, other = make(**arguments), make(**arguments)

@@ -1,8 +1,11 @@
 """caster_gym.envs.tensor.task: one control period as a function of tensors."""
 
+from typing import Any
+
 import pytest
 import torch
 
+from caster_gym import load_robot
 from caster_gym.envs.tensor.task import TorchTask
 
 CIRCLE = {"shape": "circle", "radius": 0.5}
@@ -45,14 +48,21 @@ def test_a_wrench_of_another_shape_is_refused():
         task.step(state, torch.zeros((2, 6)), torch.ones(3))
 
 
+PAIR = load_robot("chung2008")
+PAIR = PAIR.model_copy(update={"casters": PAIR.casters[:2], "actuation": "all"})
+SMALL: dict[str, Any] = {"robot": PAIR, "preview": (), "control_period": 0.01, "substeps": 2}  # to compile
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("part", ["_move", "_look", "_place"])
-@pytest.mark.parametrize("name", ["track", "follow"])
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [("track", "_move"), ("track", "_look"), ("track", "_place"), ("follow", "_look"), ("follow", "_place")],
+)
 def test_each_part_is_one_graph_for_the_compiler(name, part):
     """So that nothing in it waits for the device; a break of the graph is an error of the compiler."""
-    task = TorchTask(name, path=CIRCLE, dtype=torch.float64)
+    task = TorchTask(name, path=CIRCLE, dtype=torch.float64, **SMALL)
     state, _ = task.begin(torch.arange(3))
-    actions = torch.full((3, 6), 0.3)
+    actions = torch.full((3, 4), 0.3)
     expected = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
     setattr(task, part, torch.compile(getattr(task, part), fullgraph=True, backend="eager", dynamic=False))
     seen = task.restart(*task.step(state, actions), torch.ones(3, dtype=torch.bool))
@@ -60,21 +70,38 @@ def test_each_part_is_one_graph_for_the_compiler(name, part):
     assert torch.equal(seen[1].rewards, expected[1].rewards)
 
 
-def gradient(compiled):
-    """Of the rewards of two control periods with respect to the actions."""
-    task = TorchTask("track", path=CIRCLE, dtype=torch.float64, compile=compiled, diagnostics=False)
+def episodes(compiled):
+    """A task, its state and outcome after two control periods, and the gradient of rewards by the actions."""
+    task = TorchTask("track", path=CIRCLE, dtype=torch.float64, compile=compiled, diagnostics=False, **SMALL)
     state, _ = task.begin(torch.arange(4))
     generator = torch.Generator().manual_seed(3)
-    actions = torch.rand((2, 4, 6), generator=generator, dtype=torch.float64).sub(0.5).requires_grad_()
+    actions = torch.rand((2, 4, 4), generator=generator, dtype=torch.float64).sub(0.5).requires_grad_()
     rewards = []
     for action in actions:
         state, outcome = task.step(state, action)
         rewards.append(outcome.rewards.sum())
     torch.stack(rewards).sum().backward()
-    return actions.grad
+    return task, state, outcome, actions.grad
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    return episodes(True)
 
 
 @pytest.mark.slow
-def test_compiled_gradients_are_the_eager_ones():
+def test_compiled_gradients_are_the_eager_ones(compiled):
     """1e-12 of order 1: the same products in another order; a gradient through a wrong buffer differs by 1e-4."""
-    torch.testing.assert_close(gradient(True), gradient(False), rtol=0.0, atol=1e-12)
+    torch.testing.assert_close(compiled[-1], episodes(False)[-1], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_compiled_task_goes_on_from_arrays_without_compiling_anew(compiled):
+    """To the last bit, since the arrays have the types and strides that it was compiled for."""
+    task, state, outcome, _ = compiled
+    actions = torch.full((4, 4), 0.3, dtype=torch.float64, requires_grad=True)
+    with torch.compiler.set_stance("fail_on_recompile"):
+        expected = task.step(state.detached(), actions)
+        seen = task.step(task.from_arrays(task.to_arrays(state, outcome))[0], actions)
+    for ours, theirs in zip((*seen[0], *seen[1]), (*expected[0], *expected[1]), strict=True):
+        assert torch.equal(ours, theirs)

@@ -299,7 +299,8 @@ with begun(Path(sys.argv[1]), False, "*.txt"):
 """
 
 
-def test_a_run_in_use_is_neither_joined_nor_overwritten_nor_resumed(tmp_path):
+def test_a_run_in_use_is_neither_joined_nor_overwritten_nor_resumed(tmp_path, monkeypatch):
+    monkeypatch.setattr(FolderLock.__init__, "__defaults__", (0.0,))  # nobody ends
     folder = tmp_path / "run"
     command = [sys.executable, "-c", HOLD, str(folder)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
