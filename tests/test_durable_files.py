@@ -32,6 +32,7 @@ WRITERS = {"write_text", "write_bytes", "savefig", "savetxt", "save_file", "to_c
 OTHERWISE = {
     "caster_gym/durable_files.py": "writes the files of all others",
     "caster_gym/report/figures.py": "draws into memory",
+    "agents/learning/progress.py": "appends rows, and the saved state says how many of them count",
     "caster_gym/engines/native/compiled_files.py": "has checksums; what is lost is compiled again",
 }  # how modules write that call these, or open a file for writing, themselves
 OLD, NEW = "old " * 4000, "new " * 5000  # longer than a buffer
