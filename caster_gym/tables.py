@@ -12,10 +12,12 @@ import numpy as np
 
 from caster_gym.arrays import Array
 from caster_gym.brief import brief, cut
+from caster_gym.configuration import GREATEST
 from caster_gym.units import UNITS, read_unit
 
 LATEST_SECONDS = 10**11  # [s] a stamp beyond the year 5000 is one in ms, us or ns
 SPARSEST = 5.0  # [s] between many samples, from which on their times are hardly seconds
+_LATEST = 1e22  # of stamps in whatever unit, the year 300,000 in ns
 _MANY = 20  # samples
 _LONGEST_HEADER = 400  # characters in a message
 DECIMAL_COMMA = re.compile(r"\s*[-+]?(\d+|\d{1,3}(\.\d{3})+),\d+([eE][-+]?\d+)?\s*")
@@ -111,11 +113,11 @@ class Table:
             values = np.array([row[place] for row in self.rows], dtype=np.float64)
         except ValueError:
             values = np.full(len(self.rows), np.nan)
-        if not np.isfinite(values).all():
+        if not (np.abs(values) <= GREATEST).all():
             values = np.array([self._number(row, place) for row in range(len(self.rows))])
         return np.asarray(factor * values, dtype=np.float64)
 
-    def _number(self, row: int, place: int) -> float:
+    def _number(self, row: int, place: int, most: float = GREATEST) -> float:
         cell = self.rows[row][place]
         where = f"{self.source}, line {self.lines[row]}"
         refuse_decimal_comma(cell, where)
@@ -123,10 +125,11 @@ class Table:
             number = float(cell.replace("−", "-"))
         except ValueError:
             number = math.nan
-        if not math.isfinite(number):
+        if not abs(number) <= most:
             clock = "; write times in seconds" if re.search(r"\d:\d", cell) else ""
             name = self.columns[place].name
-            raise ValueError(f"{where}: {name!r} must be a finite number, got {brief(cell.strip())}{clock}")
+            wanted = f"a number up to {most:g}" if math.isfinite(number) else "a finite number"
+            raise ValueError(f"{where}: {brief(name)} must be {wanted}, got {brief(cell.strip())}{clock}")
         return number
 
     def times(self) -> tuple[Array, float]:
@@ -140,8 +143,8 @@ class Table:
             stamps = [Decimal(row[place].strip()) for row in self.rows]
         except InvalidOperation:
             stamps = []
-        if not stamps or not all(stamp.is_finite() for stamp in stamps):
-            stamps = [Decimal(self._number(row, place)) for row in range(len(self.rows))]
+        if not stamps or not all(stamp.is_finite() and abs(stamp) <= _LATEST for stamp in stamps):
+            stamps = [Decimal(self._number(row, place, _LATEST)) for row in range(len(self.rows))]
         name = self.columns[place].name
         if not declared and stamps and stamps[0] > LATEST_SECONDS:
             unit = "ns" if stamps[0] > LATEST_SECONDS * 10**6 else "us" if stamps[0] > LATEST_SECONDS * 10**3 else "ms"

@@ -12,6 +12,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -155,7 +156,7 @@ def main() -> None:
     starts = range(given.first, given.first + given.inputs, CHUNK)
     chunks = [range(one, min(one + CHUNK, given.first + given.inputs)) for one in starts]
     chunks = [one for one in chunks if (one.start, one.stop) not in state.done]
-    with tqdm(total=given.inputs, disable=None, unit="files") as bar:
+    with suppress(KeyboardInterrupt), tqdm(total=given.inputs, disable=None, unit="files") as bar:
         bar.update(given.inputs - sum(map(len, chunks)))
         kept = start
         for chunk, tally in tallies(given.seed, chunks, given.workers):
@@ -169,7 +170,8 @@ def main() -> None:
     for number, name, fault, words in sorted(state.total.faults)[:100]:
         print(f"{number} {name}: {fault}: {' '.join(words.split())[:300]}")
     faults = len(state.total.faults)
-    print(f"{sum(state.total.counts.values())} inputs, {faults} faults")
+    tried = sum(state.total.counts.values())
+    print(f"{tried} inputs, {faults} faults" + ("" if tried >= given.inputs else "; --resume goes on"))
     if given.out:
         text = page(state.total, given.seed, state.seconds + time.monotonic() - start, given.workers)
         given.out.write_text(text, encoding="utf-8")

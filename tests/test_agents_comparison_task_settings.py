@@ -167,3 +167,12 @@ def test_the_robot_of_a_task_may_be_a_mapping():
         ConfigurationError, match=r"task: 'robot': the robot: unknown key 'nam'; did you mean 'name'\?$"
     ):
         parse(TaskSettings, {**PATHS, "robot": {**robot.model_dump(mode="json"), "nam": 1}}, "task")
+
+
+def test_paths_are_not_endless_and_the_first_that_is_not_held_out_is_told():
+    circles = [{"shape": "circle", "radius": 1.0 + 0.01 * k} for k in range(201)]
+    with pytest.raises(ConfigurationError, match="'train' should have at most 200 items"):
+        parse(TaskSettings, {**PATHS, "train": circles}, "a")
+    twice = {**PATHS, "train": [*circles[:3], *circles[:3]], "test": [{"shape": "circle", "radius": 1.02}]}
+    with pytest.raises(ConfigurationError, match="as test path 1 and as training path 3;"):
+        parse(TaskSettings, twice, "a")

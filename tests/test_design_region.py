@@ -131,3 +131,17 @@ def test_a_path_that_cannot_be_timed_is_refused_before_the_search():
     target = DesignTarget(**LIMITS, **BOUNDS, paths=(Circle(duration=1e-4),))
     with pytest.raises(ValueError, match="a path needs at least 10"):
         check_designable(ROBOT, target)
+
+
+def test_robots_of_more_casters_than_can_be_searched_are_refused():
+    turns = 2.0 * np.pi * np.arange(13) / 13
+    places = [{"x": float(np.cos(turn)), "y": float(np.sin(turn))} for turn in turns]
+    many = ROBOT.model_copy(update={"casters": tuple(ROBOT.casters[0].model_copy(update=place) for place in places)})
+    with pytest.raises(ValueError, match="has 13 casters; designs are searched for at most 12"):
+        check_designable(many, DesignTarget(**{**LIMITS, **BOUNDS}))
+
+
+def test_paths_of_too_many_time_steps_are_refused_before_they_are_made():
+    target = DesignTarget(**{**LIMITS, **BOUNDS, "paths": [{"shape": "random_paths", "count": 100_000}]})
+    with pytest.raises(ValueError, match=r"the paths take 5e\+07 time steps together, at most 400000 are looked at"):
+        check_designable(ROBOT, target)

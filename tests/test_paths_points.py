@@ -16,10 +16,10 @@ def test_long_lists_of_points_and_numbers_pass():
 @pytest.mark.parametrize(
     ("points", "sizes", "said"),
     [
-        ([[0, 1]] * FEW + [[0]], (2, 3), "waypoint 1001 should be 2 or 3 numbers, got \\[0\\]"),
-        ([[0, 1]] * FEW + ["ab"], (2, 3), "waypoint 1001 should be 2 or 3 numbers, got 'ab'"),
+        ([[0, 1]] * FEW + [[0]], (2, 3), "waypoint 31 should be 2 or 3 numbers, got \\[0\\]"),
+        ([[0, 1]] * FEW + ["ab"], (2, 3), "waypoint 31 should be 2 or 3 numbers, got 'ab'"),
         ([[0, True]] + [[0, 1]] * FEW, (2, 3), "waypoint 1 should be 2 or 3 numbers"),
-        ([0.0] * FEW + [None], (), "waypoint 1001 should be a number, got None"),
+        ([0.0] * FEW + [None], (), "waypoint 31 should be a number, got None"),
     ],
 )
 def test_the_first_that_is_none_is_told(points, sizes, said):

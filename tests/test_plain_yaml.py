@@ -9,6 +9,7 @@ import yaml
 from caster_gym import plain_yaml
 from caster_gym.plain_yaml import YamlError, read_plain_yaml
 
+PARSERS = [yaml.SafeLoader, *([yaml.CSafeLoader] if yaml.__with_libyaml__ else [])]
 FILES = sorted((Path(__file__).parents[1] / "configs").rglob("*.yaml"))
 
 
@@ -29,7 +30,10 @@ FILES = sorted((Path(__file__).parents[1] / "configs").rglob("*.yaml"))
         "🛞: ½ … \u00a0",
     ],
 )
-def test_data_are_read_as_the_safe_loader_reads_them(text):
+@pytest.mark.parametrize("parser", PARSERS, ids=lambda parser: parser.__name__)
+def test_data_are_read_as_the_safe_loader_reads_them(monkeypatch, parser, text):
+    """With libyaml, and with PyYAML built without it."""
+    monkeypatch.setattr(plain_yaml, "_PARSER", parser)
     assert read_plain_yaml(text) == yaml.safe_load(text)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from caster_gym.table_files import read_table
 from caster_gym.tables import Column, Quantity, Table, TableNote
 
 QUANTITIES = {
@@ -102,3 +103,20 @@ def test_many_times_that_are_far_apart_are_hardly_seconds_unless_that_is_said():
         table(["t"], *rows).times()
     assert table([("t", "s")], *rows).times()[0][-1] == 580.0
     assert table([("t", "ms")], *rows).times()[0][-1] == pytest.approx(0.58)
+
+
+@pytest.mark.parametrize(
+    ("time", "x", "said"),
+    [
+        ("1", "1e16", "line 3: 'x' must be a number up to 1e.15, got '1e16'"),
+        ("1", "1e999", "line 3: 'x' must be a finite number, got '1e999'"),
+        ("1e999999", "1", "line 3: 'time' must be a finite number, got '1e999999'"),
+        ("1e23", "1", "line 3: 'time' must be a number up to 1e.22, got '1e23'"),
+    ],
+)
+def test_numbers_that_nothing_can_be_computed_with_are_refused_with_their_line(tmp_path, time, x, said):
+    (tmp_path / "odd.csv").write_text(f"time,x\n0,0\n{time},{x}\n")
+    quantities = {"time": Quantity("time", ("time",)), "x": Quantity("length", ("x",))}
+    table = read_table(tmp_path / "odd.csv").matched(quantities)
+    with pytest.raises(ValueError, match=said):
+        (table.times(), table.numbers(["x"]))

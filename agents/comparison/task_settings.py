@@ -19,9 +19,11 @@ from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
 from caster_gym.wrappers.specification import FeatureSpecification
 
+MOST_PATHS = 200  # of each kind
+
 Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
-Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1)]
+Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1, max_length=MOST_PATHS)]
 RewardSpecification: TypeAlias = Annotated[
     Potential | Tolerance | Effort | Smoothness | TractionUse | Impact, Field(discriminator="kind")
 ]
@@ -144,13 +146,12 @@ class TaskSettings(ChosenTask):
             ("validation", self.validation, "training", self.train),
             ("test", self.test, "validation", self.validation),
         ):
-            starts = [_first_of(path) for path in used]
-            for i, path in enumerate(paths):
-                if _first_of(path) in starts:
-                    k = starts.index(_first_of(path))
+            starts = {_first_of(path): k for k, path in reversed(list(enumerate(used, start=1)))}
+            for i, path in enumerate(paths, start=1):
+                if (k := starts.get(_first_of(path))) is not None:
                     raise ValueError(
                         f"a {kind} path must not be among the {other} paths, got {in_brief(path)} as {kind} path "
-                        f"{i + 1} and as {other} path {k + 1}; {_remedy(path)}"
+                        f"{i} and as {other} path {k}; {_remedy(path)}"
                     )
         return self
 

@@ -22,6 +22,7 @@ from caster_gym.robot import Robot
 
 Objective: TypeAlias = Literal["isotropy", "torque", "use"]
 
+MOST_CASTERS = 12
 _AT_BOUND = 1e-3  # [-] of the region's width
 TYPICAL = ((0.5, 0.5), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0))  # places where designs are tried beforehand
 
@@ -139,10 +140,15 @@ def wheel_room(robot: Robot) -> float:
 def check_designable(robot: Robot, target: DesignTarget) -> Region:
     """The region of the designs of a robot, if there is anything to be found in it.
 
-    Raises ValueError for casters that differ, for bounds within which all wheels could touch, for driven joints that
-    are singular at some steering angles, for motors that push too unevenly as the robot is or in all designs, and for
-    paths that cannot be timed.
+    Raises ValueError for more casters than can be searched, casters that differ, for bounds within which all wheels
+    could touch, for driven joints that are singular at some steering angles, for motors that push too unevenly as the
+    robot is or in all designs, and for paths that cannot be timed.
     """
+    if robot.caster_count > MOST_CASTERS:
+        raise ValueError(
+            f"robot {robot.name!r} has {robot.caster_count} casters; designs are searched for at most {MOST_CASTERS}, "
+            "since the combinations of their steering angles grow as a power"
+        )
     radius_and_trail(robot)
     trajectories_of(target)
     able = driven_as(robot, target)

@@ -36,7 +36,7 @@ class Target(Frozen):
     accelerating_up_to: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0  # [-] of speed and yaw rate; beyond, cruising
     flip_speed: NonNegativeFloat | None = None  # [m/s] up to which casters may stand at any angle; None: by (S2)
     payload: Payload | None = None
-    paths: tuple[PathSpecification, ...] = ()
+    paths: Annotated[tuple[PathSpecification, ...], Field(max_length=200)] = ()
     time_step: Positive = 0.02  # [s] at which paths are looked at
     actuation: Literal["all"] | tuple[str, ...] | None = None  # driven joints; None: as the robot file says
     margin: Annotated[float, Field(ge=1.0)] = 1.3  # [-] as if every torque and speed were that many times as great

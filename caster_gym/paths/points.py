@@ -6,7 +6,7 @@ from typing import Any
 
 from caster_gym.brief import brief
 
-FEW = 1000  # points, of which all that are wrong are told, by the types
+FEW = 30  # points, of which all that are wrong are told, by the types
 
 
 def check_long(points: Any, what: str, sizes: Collection[int] = ()) -> None:

@@ -6,6 +6,7 @@ that asked for it, which watches `Progress`.
 
 import os
 import resource
+import signal
 import sys
 import time
 import warnings
@@ -148,6 +149,7 @@ def work(seed: int, number: "Synchronized[int]", asked: Connection) -> None:
     """Try ranges of inputs that are asked for until None is; number says which one is being tried, −1 none."""
     os.environ["OMP_NUM_THREADS"] = "1"
     warnings.simplefilter("ignore")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # which is meant for the process that asks
     with TemporaryDirectory(dir=_memory()) as folder:
         trials = Trials(Path(folder))
         while (inputs := asked.recv()) is not None:
