@@ -41,16 +41,16 @@ TASK = {
 ARRAYS = {**TASK, "wrappers": [{"kind": "sensor_noise", "position": 0.001}], "shaping": [{"kind": "effort"}]}
 COMMON = {"net_arch": [16], "validations": 8, "save_every": INTERVAL}
 AGENTS: dict[str, dict[str, Any]] = {
-    "ppo": {"algorithm": "ppo", "n_envs": 8, "n_steps": 64, "batch_size": 64, "n_timesteps": 40_000},
+    "ppo": {"algorithm": "ppo", "n_envs": 8, "n_steps": 64, "batch_size": 64, "n_timesteps": 20_000},
     "sac": {
         "algorithm": "sac",
         "n_envs": 8,
         "batch_size": 64,
         "buffer_size": 5000,
         "learning_starts": 500,
-        "n_timesteps": 8_000,
+        "n_timesteps": 4_000,
     },
-    "shac": {"algorithm": "shac", "n_envs": 8, "n_steps": 4, "batch_size": 32, "compile": False, "n_timesteps": 4_000},
+    "shac": {"algorithm": "shac", "n_envs": 8, "n_steps": 4, "batch_size": 32, "compile": False, "n_timesteps": 1_000},
 }
 
 

@@ -3,6 +3,7 @@
 import csv
 import random
 import shutil
+import threading
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,12 @@ import torch
 import yaml
 
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.learning.settings import PPOSettings, RslPPOSettings, SACSettings, SHACSettings
+from caster_gym.agents.learning.actor import Actor
+from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.agents.learning.training import train
+from caster_gym.agents.learning.training_run import Run
 from caster_gym.configuration import ConfigurationError, parse
+from caster_gym.durable_files import FolderInUseError, FolderLock
 
 CLOCKS = ("seconds", "validation/seconds", "time/fps", "time/time_elapsed")  # columns that tell the time of day
 TINY: dict[str, Any] = {"net_arch": (8,), "n_envs": 8, "batch_size": 64, "validations": 2, "save_every": 0.0}
@@ -144,3 +148,65 @@ def test_a_state_that_is_none_says_so(undisturbed, tmp_path):
     (tmp_path / "run" / "state" / "state.safetensors").write_bytes(b"nothing")
     with pytest.raises(ConfigurationError, match="holds no state from which a training can go on"):
         train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
+
+
+class Counting(LearnerSettings):
+    """A learner of a user's own, which goes on as docs/resuming.md says; it learns nothing."""
+
+    n_timesteps: int = 6
+    validations: int = 2
+    save_every: float = 0.0
+
+    def learn(self, run: Run) -> None:
+        numbers: list[float] = [] if run.saved is None else list(run.saved.numbers["numbers"])
+        bias = np.zeros(6, np.float32) if run.saved is None else np.array(run.saved.arrays["bias"])
+        steps = run.steps
+
+        def actor():
+            made = Actor(run.layout.size, (2,), run.actions, "clip")
+            with torch.no_grad():
+                for weights in made.parameters():
+                    weights.zero_()
+                made.head.bias.copy_(torch.from_numpy(bias))
+            return made
+
+        try:
+            while steps < self.n_timesteps:
+                run.advance(steps, actor)
+                run.save(steps, lambda: ({"bias": bias}, {"numbers": numbers}))
+                steps += 1
+                np.add(bias, np.float32(0.01 * (1 + len(numbers))), out=bias)
+                numbers.append(float(bias[0]))
+                run.record(steps, {"train/sum": sum(numbers)})
+        finally:
+            run.finish(steps, actor)
+
+
+def test_a_learner_of_a_users_own_goes_on(tmp_path):
+    def interrupt(steps, verdict):
+        if steps >= 4:
+            raise KeyboardInterrupt
+
+    settings = Counting(algorithm="counting:Counting")
+    train(ON_ARRAYS, settings, 0, tmp_path / "whole", nothing)
+    with pytest.raises(KeyboardInterrupt):
+        train(ON_ARRAYS, settings, 0, tmp_path / "stopped", interrupt)
+    train(ON_ARRAYS, settings, 0, tmp_path / "stopped", nothing, resume=True)
+    assert content(tmp_path / "stopped") == content(tmp_path / "whole")
+    assert len(content(tmp_path / "whole")[2]) == 6 + len(content(tmp_path / "whole")[1])
+
+
+def test_a_folder_in_use_is_refused(tmp_path):
+    """As a second process would be."""
+    refused: list[str] = []
+
+    def start_another():
+        with pytest.raises(FolderInUseError, match="is in use by process") as caught:
+            train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path, nothing, resume=True)
+        refused.append(str(caught.value))
+
+    with FolderLock(tmp_path):
+        other = threading.Thread(target=start_another)
+        other.start()
+        other.join()
+    assert len(refused) == 1

@@ -31,6 +31,7 @@ from caster_gym.report.run_folder import begun, check_file
 from caster_gym.shipped_files import read_settings
 
 AGENTS_THERE = "Folder of a trained policy, name of a model-based agent, or YAML file of your own controller"
+GO_ON = "what was finished is kept; --resume goes on from the last saved state"
 MJCF_SUFFIXES = (".xml", ".mjcf")
 
 app = typer.Typer(
@@ -68,7 +69,7 @@ def train(
     threads: Threads = DEFAULT_THREADS,
 ) -> None:
     """Train a policy. Save the one that is best on the validation paths in OUT/best, for `evaluate` and `watch`."""
-    with plain_errors():
+    with plain_errors(GO_ON):
         from caster_gym.agents.comparison.metrics import in_words
         from caster_gym.agents.learning.training import FILES, WORTH_KEEPING
         from caster_gym.agents.learning.training import train as run
@@ -124,7 +125,7 @@ def benchmark(
     threads: Threads = DEFAULT_THREADS,
 ) -> None:
     """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
-    with plain_errors():
+    with plain_errors(GO_ON):
         from caster_gym.agents.commands.benchmark import (
             FILES,
             WORTH_KEEPING,

@@ -1,5 +1,6 @@
 """Options that the commands share, settings of the form KEY=VALUE, and errors as one sentence."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -106,7 +107,7 @@ def plain_errors(interrupted: str = "what was finished is kept") -> Iterator[Non
             yield
     except OSError as error:
         if error.filename and error.strerror:  # else the message is a sentence already
-            refuse(f"{error.filename}: {error.strerror.lower()}", error)
+            refuse(f"{os.fsdecode(error.filename)}: {error.strerror.lower()}", error)
         refuse(str(error), error)
     except (ValueError, DependencyNotInstalled) as error:
         refuse(str(error), error)

@@ -11,4 +11,4 @@ def in_words(verdict: Any) -> str:
     for name, how in shown(type(verdict)):
         if isinstance(how, Printed):
             parts.append(f"{how.title} {how.factor * getattr(verdict, name):.3g} {how.unit}")
-    return ", ".join([*parts, f"{verdict.failures} failure{'s' * (verdict.failures != 1)}"])
+    return ", ".join([*parts, f"{verdict.failures:g} failure{'s' * (verdict.failures != 1)}"])
