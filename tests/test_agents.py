@@ -7,7 +7,15 @@ from pathlib import Path
 import caster_gym.agents
 
 HOME = Path(caster_gym.agents.__path__[0])
-ROOMS = ["workers", "control", "comparison", "learning", "registry", "commands"]  # each imports from those before it
+ROOMS = [
+    "workers",
+    "control",
+    "comparison",
+    "learning",
+    "registry",
+    "sweep",
+    "commands",
+]  # each imports from those before it
 
 
 def room_of(module: str) -> str:

@@ -17,11 +17,11 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history, tune
 from caster_gym.agents.control.computed_torque import ComputedTorque, ComputedTorqueSettings
 from caster_gym.agents.control.protocol import ControllerSettings
-from caster_gym.agents.learning import training
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
+from caster_gym.agents.workers import opening
 from caster_gym.agents.workers.local import LocalWorkers
 from caster_gym.configuration import ConfigurationError
 from caster_gym.engines.tensor.threads import DEFAULT
@@ -214,8 +214,8 @@ def test_sixteen_cores_change_no_numbers(tmp_path, settings, task, monkeypatch, 
         def __exit__(self, *_):
             pass
 
-    monkeypatch.setattr(training, "LocalWorkers", Workers)
-    monkeypatch.setattr(training, "usable_cores", lambda: 16)
+    monkeypatch.setattr(opening, "LocalWorkers", Workers)
+    monkeypatch.setattr(opening, "usable_cores", lambda: 16)
     agent = read_agent(settings.agents[1], {"n_timesteps": 512})
     assert isinstance(agent, LearnerSettings)
     train_all([Job(f"ppo seed {seed}", task, agent, seed, tmp_path) for seed in range(5)], *threads)

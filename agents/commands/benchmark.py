@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import Field, PositiveInt, field_validator
+from pydantic import Field, PositiveInt
 
 from caster_gym.agents.comparison import results
 from caster_gym.agents.comparison.evaluation import bare, evaluation_batch
 from caster_gym.agents.comparison.results import Contender, compare, write_results
-from caster_gym.agents.comparison.task_settings import Seed, TaskSettings
+from caster_gym.agents.comparison.task_settings import Seed, Seeds, TaskSettings
 from caster_gym.agents.comparison.validation import read_history, tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
 from caster_gym.agents.learning import training, usual_names
@@ -18,6 +18,7 @@ from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import LearnerSettings
 from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
+from caster_gym.agents.workers.calls import Workers
 from caster_gym.configuration import ConfigurationError, Frozen, Positive
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.file_names import NameOrFile
@@ -44,18 +45,11 @@ class BenchmarkSettings(Frozen):
     }
     task: NameOrFile = "track"  # name of a file in configs/tasks, or path of one
     agents: Annotated[tuple[NameOrFile, ...], Field(min_length=1)]  # names of files in configs/agents, or paths
-    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2, 3, 4)  # of each learned agent
+    seeds: Seeds = (0, 1, 2, 3, 4)  # of each learned agent
     starts: PositiveInt = 1  # episodes on each test path, with different starts
     start_seed: Seed = 1000  # the same starts for every agent
     settling: Positive | None = None  # [s] what comes before counts as transient; None: as suits the task
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-
-    @field_validator("seeds")
-    @classmethod
-    def _seeds_differ(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        if len(set(seeds)) < len(seeds):
-            raise ValueError(f"must differ from one another, got {list(seeds)}")
-        return seeds
 
 
 class Comparison(NamedTuple):
@@ -78,14 +72,20 @@ def read_comparison(settings: BenchmarkSettings, changes: Mapping[str, Any] | No
     return Comparison(settings, read_settings(TaskSettings, "tasks", settings.task), agents)
 
 
-def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT, resume: bool = False) -> str:
+def run_benchmark(
+    comparison: Comparison,
+    folder: Path,
+    threads: int = DEFAULT,
+    resume: bool = False,
+    workers: Workers | None = None,
+) -> str:
     """Train what learns, tune what is tuned, evaluate all on the test paths; returns the table.
 
     threads: of each training run, of which there are as many at a time as the cores allow, and of the evaluation. The
     folder gets policies/, episodes.csv, summary.csv, table.md, run.yaml and figures.
 
     resume: trainings in policies/ that are completed are used as they are, others go on where they stopped, and new
-    ones are begun. Raises ConfigurationError where one has other settings.
+    ones are begun. Raises ConfigurationError where one has other settings. workers: see `train_all`.
     """
     settings, task, agents = comparison
     jobs = [
@@ -105,7 +105,7 @@ def run_benchmark(comparison: Comparison, folder: Path, threads: int = DEFAULT, 
             for name, agent in agents.items()
             if isinstance(agent, ControllerSettings)
         }
-    train_all(jobs, threads, resume)
+    train_all(jobs, threads, resume, workers)
     ready: dict[str, list[tuple[Agent, int | None]]] = {
         name: [(tuned[name].controller, None)]
         if name in tuned

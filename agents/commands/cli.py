@@ -1,4 +1,4 @@
-"""The command caster-gym: train, evaluate, benchmark, watch, design, identify, export, warm."""
+"""The command caster-gym: train, evaluate, benchmark, sweep, watch, design, identify, export, warm."""
 
 from itertools import count
 from pathlib import Path
@@ -18,6 +18,7 @@ from caster_gym.agents.commands.command_line import (
     TaskName,
     Threads,
     TrainedTask,
+    WhichWorkers,
     changes_of,
     files_among,
     plain_errors,
@@ -123,6 +124,7 @@ def benchmark(
     resume: Resume = False,
     change: Changes = None,
     threads: Threads = DEFAULT_THREADS,
+    workers: WhichWorkers = "local",
 ) -> None:
     """Train the learned agents and compare all agents on the same held-out paths, in a table and in figures."""
     with plain_errors(GO_ON):
@@ -133,14 +135,47 @@ def benchmark(
             read_comparison,
             run_benchmark,
         )
+        from caster_gym.agents.workers.opening import open_workers
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
         named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
+        at_work = open_workers(workers, threads, len(comparison.agents) * len(settings.seeds))
         with begun(out, overwrite, WORTH_KEEPING, named, FILES, resume):
-            text = run_benchmark(comparison, out, threads, resume)
+            text = run_benchmark(comparison, out, threads, resume, at_work)
         typer.echo(text)
         typer.echo(f"Results, policies and figures are in {out}.")
+
+
+@app.command()
+def sweep(
+    config: Annotated[str, typer.Argument(help="Name of a search in configs/sweeps, or path of a YAML file.")],
+    out: Out = Path("runs/sweep"),
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    change: Changes = None,
+    threads: Threads = DEFAULT_THREADS,
+    workers: WhichWorkers = "local",
+) -> None:
+    """Search settings of an agent or a task: many trainings, of which later ones learn from earlier ones.
+
+    Writes a table of all trials, what mattered, and OUT/best.yaml, which `train` reads. Stopped at any time, it goes on
+    by --resume.
+    """
+    with plain_errors("what was finished is kept; --resume goes on"):
+        from caster_gym.agents.sweep.settings import SweepSettings, read_sweep
+        from caster_gym.agents.sweep.sweeping import FILES, WORTH_KEEPING, run_sweep
+        from caster_gym.agents.workers.opening import open_workers
+
+        settings = read_settings(SweepSettings, "sweeps", config)
+        searched = read_sweep(settings, changes_of(change))
+        robot = searched.candidate({}).task.robot
+        named = files_among(config, settings.task, settings.agent, robot)
+        at_work = open_workers(workers, threads, min(settings.at_once, settings.trials))
+        with begun(out, overwrite, WORTH_KEEPING, named, FILES, resume):
+            text = run_sweep(searched, out, at_work, threads, resume)
+        typer.echo(text)
+        typer.echo(f"Results and policies are in {out}; `caster-gym train {out / 'best.yaml'}` trains the best again.")
 
 
 @app.command()

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 from gymnasium.error import DependencyNotInstalled
@@ -18,6 +18,7 @@ from caster_gym.processes import exit_code, interruptible
 NOTHING_WRITTEN = "nothing was written"
 PARTS_BAR = "{desc}: {n_fmt}/{total_fmt} parts |{bar:24}| {elapsed}{postfix}"
 MOST_THREADS = 1024  # far more make systems refuse memory that is there
+OF_SCALE = ("optuna", "ray")  # packages of that extra
 LONGEST_MESSAGE = 1000  # characters
 DEFAULT_THREADS = learning_threads()
 
@@ -39,6 +40,14 @@ TrainedTask = Annotated[
     typer.Option(
         help="Name of a task in configs/tasks, or path of a YAML file. Default: the task that the policy was "
         "trained on, or track."
+    ),
+]
+WhichWorkers = Annotated[
+    Literal["local", "ray"],
+    typer.Option(
+        "--workers",
+        help="local: processes on this machine. ray: tasks on a Ray cluster, that of RAY_ADDRESS, or a new one on this "
+        "machine; the folder must lie where all machines of the cluster see it.",
     ),
 ]
 Threads = Annotated[
@@ -120,7 +129,8 @@ def plain_errors(interrupted: str = "what was finished is kept") -> Iterator[Non
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("caster_gym"):
             raise
-        refuse(f"this needs the Python package {error.name!r}: pip install 'caster_gym[train]'", error)
+        extra = "scale" if error.name in OF_SCALE else "train"
+        refuse(f"this needs the Python package {error.name!r}: pip install 'caster_gym[{extra}]'", error)
     except KeyboardInterrupt as error:
         typer.echo(f"caster-gym: interrupted; {interrupted}", err=True)
         raise typer.Exit(exit_code(error)) from None

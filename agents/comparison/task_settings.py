@@ -4,7 +4,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Field, SerializeAsAny, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializeAsAny,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from caster_gym.arena.arena import Arena, read_arena
@@ -22,6 +30,15 @@ from caster_gym.wrappers.specification import FeatureSpecification
 MOST_PATHS = 200  # of each kind
 
 Seed: TypeAlias = Annotated[int, Field(ge=0, lt=2**32)]
+
+
+def _differ(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(seeds)) < len(seeds):
+        raise ValueError(f"must differ from one another, got {list(seeds)}")
+    return seeds
+
+
+Seeds: TypeAlias = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_differ)]  # of several trainings
 Fraction: TypeAlias = Annotated[float, Field(gt=0.0, le=1.0)]
 Paths: TypeAlias = Annotated[tuple[PathSpecification, ...], Field(min_length=1, max_length=MOST_PATHS)]
 RewardSpecification: TypeAlias = Annotated[

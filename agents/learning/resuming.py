@@ -1,6 +1,6 @@
 """Whether a folder holds a training that can go on, or is completed: its run.yaml says what it was started with."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +13,20 @@ RUN = "run.yaml"
 FREE = ("agent.save_every",)  # settings on which no result depends
 
 
-def is_completed(folder: Path, facts: Mapping[str, Any]) -> bool:
-    """Whether the training in a folder is completed; False if there is none.
+def is_completed(folder: Path, facts: Mapping[str, Any], what: str = "training", free: Collection[str] = FREE) -> bool:
+    """Whether the training, or what else it is called, in a folder is completed; False if there is none.
 
     facts: settings of the one that is asked for, by their keys in run.yaml. Raises ConfigurationError that names the
-    first setting in which the one in the folder differs.
+    first setting in which the one in the folder differs, but for those that are free to change.
     """
     path = folder / RUN
     if not path.exists():
         return False
     found = read_yaml(path)
     for name, before, now in _differences({key: found.get(key) for key in facts}, facts):
-        if name not in FREE:
+        if name not in free:
             raise ConfigurationError(
-                f"{folder} holds a training with {name} {before!r}, and now it is {now!r}: a training goes on with the "
+                f"{folder} holds a {what} with {name} {before!r}, and now it is {now!r}: a {what} goes on with the "
                 "settings it was started with; choose another folder for others"
             )
     return found.get("completed") is True

@@ -4,7 +4,7 @@ With the same settings, seed, number of threads and versions on the same machine
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,11 +16,10 @@ from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS
 from caster_gym.agents.learning.resuming import best_of, is_completed
 from caster_gym.agents.learning.settings import LearnerSettings
-from caster_gym.agents.learning.training_run import Report, Run
-from caster_gym.agents.workers.calls import Call, Reported
-from caster_gym.agents.workers.local import LocalWorkers
+from caster_gym.agents.learning.training_run import Enough, EnoughError, Report, Run
+from caster_gym.agents.workers.calls import Call, Reported, Workers
+from caster_gym.agents.workers.opening import open_workers
 from caster_gym.durable_files import MARK, FolderLock
-from caster_gym.engines.native.cores import usable_cores
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.own_errors import in_own_code
 from caster_gym.report.provenance import write_provenance
@@ -40,6 +39,7 @@ def train(
     report: Report,
     threads: int = DEFAULT,
     resume: bool = False,
+    enough: Enough | None = None,
 ) -> Validation:
     """Train into a folder: bundles best/ and checkpoints/, validation.csv, progress.csv, TensorBoard events, run.yaml.
 
@@ -48,6 +48,8 @@ def train(
     resume: go on where the training in this folder stopped, however its process ended; the result is the same to the
     last bit as without a stop. A folder without one is begun; one that is completed is left as it is, and its best
     validation returned. Raises ConfigurationError where the training there has other settings.
+
+    enough: is asked after each validation whether the training ends there, as if it were completed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with FolderLock(folder):
@@ -63,9 +65,10 @@ def train(
             return best_of(folder, task)
         write_provenance(folder, **facts, completed=False)
         run = Run(folder, task, settings, seed, report, resume)
+        run.enough = enough
         completed = False
         try:
-            with limit_threads(threads), _told(settings):
+            with limit_threads(threads), _told(settings), suppress(EnoughError):
                 settings.learn(run)
             completed = True
         finally:
@@ -101,18 +104,21 @@ class Job(NamedTuple):
     folder: Path
 
 
-def train_all(jobs: Sequence[Job], threads: int = DEFAULT, resume: bool = False) -> None:
+def train_all(
+    jobs: Sequence[Job], threads: int = DEFAULT, resume: bool = False, workers: Workers | None = None
+) -> None:
     """Train all jobs, as many at a time as there are cores for their threads, with one progress bar over all steps.
 
     Interrupted by Ctrl-C, running jobs keep what they have learned, and KeyboardInterrupt is raised. resume: see
-    `train`; jobs that are completed take no time.
+    `train`; jobs that are completed take no time. workers: who trains; None: processes on this machine.
     """
     if not jobs:
         return
-    with LocalWorkers(max(1, min(len(jobs), usable_cores() // threads))) as workers, _bar(jobs) as show:
+    with workers or open_workers("local", threads, len(jobs)) as at_work, _bar(jobs) as show:
         for job in jobs:
-            workers.submit(Call(job.name, _train_job, (job, threads, resume)))
-        for event in workers.events():
+            there = job._replace(folder=job.folder.absolute())
+            at_work.submit(Call(job.name, _train_job, (there, threads, resume), again=(there, threads, True)))
+        for event in at_work.events():
             if isinstance(event, Reported):
                 show(event.number, *event.content)
 

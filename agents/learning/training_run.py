@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -24,7 +24,16 @@ from caster_gym.envs.observation import ObservationLayout
 from caster_gym.report.provenance import versions
 
 STEPS = "time/total_timesteps"  # SB3's column of steps in progress.csv
+Enough = Callable[[Sequence[Validation]], bool]  # whether a run ends after these validations, before its time
 Report = Callable[[int, str], None]  # called with steps done and the last verdict in words, "" before the first
+
+
+class DivergedError(ValueError):
+    """Training has led to a policy that is none."""
+
+
+class EnoughError(Exception):
+    """Ends a run after a validation, as if it had done all its steps."""
 
 
 class Run:
@@ -50,6 +59,7 @@ class Run:
         self.history: list[Validation] = []
         self.best: Validation | None = None
         self.steps = 0
+        self.enough: Enough | None = None
         self._diverged = False
         self._validating = 0.0
         self._due = settings.n_timesteps / settings.validations
@@ -146,6 +156,8 @@ class Run:
         if steps >= self._due:
             self._due += self.settings.n_timesteps / self.settings.validations
             self.validate(actor())
+            if self.enough is not None and self.enough(self.history):
+                raise EnoughError
         self.report(steps, in_words(self.history[-1].verdict) if self.history else "")
 
     def finish(self, steps: int, actor: Callable[[], Actor]) -> None:
@@ -161,7 +173,7 @@ class Run:
         if isinstance(self.settings, GradientLearner):
             rate = scheduled(self.settings.learning_rate, 1.0)
             advice = f", with a learning_rate of {rate:g}; try a smaller one"
-        raise ValueError(f"training has diverged after {steps} steps{advice}") from cause
+        raise DivergedError(f"training has diverged after {steps} steps{advice}") from cause
 
     def validate(self, actor: Actor) -> None:
         """Try a policy on the validation paths, keep it, and keep it as the best one if it is."""

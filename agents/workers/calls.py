@@ -13,12 +13,17 @@ ATTEMPTS = 5  # of a call whose process is killed, or whose machine is lost, aga
 class Call(NamedTuple):
     """A call of `function(*arguments, report)`, which may `report(anything)` while it lasts; all of it is pickled.
 
-    Where its process is killed it is called again: it must go on from what it has left, or give the same once more.
+    If its process is killed, another one calls it again, and it must go on from what is left, or give the same.
     """
 
     name: str  # in messages
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
+    again: tuple[Any, ...] | None = None  # arguments of later calls, if they are others
+
+    def work(self, attempt: int) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """What is called at an attempt, 1, 2, …"""
+        return self.function, self.arguments if attempt == 1 or self.again is None else self.again
 
 
 class Reported(NamedTuple):

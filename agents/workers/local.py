@@ -65,7 +65,7 @@ class LocalWorkers(Workers):
         while True:
             worker = self._idle.pop() if self._idle else self._start()
             try:
-                worker.connection.send(self._calls[number][1:])
+                worker.connection.send(self._calls[number].work(self._attempts[number]))
             except OSError:  # somebody has killed it while it had nothing to do
                 worker.process.join()
                 continue
