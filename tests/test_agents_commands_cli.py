@@ -39,7 +39,7 @@ def test_help_shows_every_word_that_was_written(call, name):
 
 
 def test_help_of_export_has_its_unit(call):
-    assert "Time step of the model [s]; MuJoCo's slip" in " ".join(call("export", "-h").stdout.split())
+    assert "Time step of the model [s]; the slip" in " ".join(call("export", "-h").stdout.split())
 
 
 def test_version_is_shown(call):

@@ -44,7 +44,10 @@ from tests.command_calls import TASK, TINY, assert_refused
         ),
         (["train", "--set", "stepz=3"], "did you mean 'n_steps'?"),
         (["train", "--set", "n_timesteps=many"], "should be a whole number, got 'many'"),
-        (["train", "--set", "n_timesteps=["], "--set n_timesteps=[ cannot be read as YAML: expected the node content"),
+        (
+            ["train", "--set", "n_timesteps=["],
+            "--set n_timesteps=[ cannot be read as YAML: did not find expected node content",
+        ),
     ],
 )
 def test_mistakes_get_one_sentence(call, tmp_path, arguments, message):

@@ -83,6 +83,17 @@ def test_everything_that_a_step_imports_is_on_the_page_or_plumbing():
 
 
 def test_everything_on_tensors_is_on_the_page_or_plumbing_too():
-    """Plumbing there: what a task is made from, what goes in and out of calls, and starts, which no step needs."""
-    plumbing = {"inputs", "engine", "layout", "plan", "reference", "report", "starts", "state"}
+    """Plumbing there: what a task is made from, what goes in and out of calls, and starts and saved states."""
+    plumbing = {
+        "inputs",
+        "engine",
+        "layout",
+        "plan",
+        "reference",
+        "report",
+        "starts",
+        "state",
+        "saved",
+        "specification",
+    }
     assert (imported(TASK) | imported(LOOK)) - plumbing <= {Path(file).stem for file in FILES["on tensors"].values()}

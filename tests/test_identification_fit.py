@@ -243,7 +243,7 @@ def test_unknowns_that_only_show_together_are_named_together():
     recording = Recording(0.02, states[:, :3], states[:, 6:], torque, states[:, 3:6])
     found = identify(CHUNG, recording, tuple(truth), truth)
     (sentence,) = found.untold
-    assert sentence.startswith("The recording does not tell roll_viscous and roll_coulomb apart")
+    assert sentence.startswith("The recording cannot separate roll_viscous and roll_coulomb")
     viscous, dry = (float(sentence.split(f"{name} ")[-1].split()[0]) for name in truth)
     assert viscous * rate == pytest.approx(-dry, rel=0.01)  # three digits are written
     assert not found.is_told.any()

@@ -4,17 +4,19 @@ from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
 from os import PathLike, fspath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from caster_gym.envs.native.engine import TaskEngine
 from caster_gym.paths.timed import timed_path
 from caster_gym.paths.trajectory import Trajectory
 from caster_gym.states import describe
+
+if TYPE_CHECKING:
+    from caster_gym.envs.native.engine import TaskEngine  # which imports SciPy, by way of Numba
 
 
 def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
@@ -22,7 +24,7 @@ def plain_specification(spec: EnvSpec | None) -> EnvSpec | None:
     return spec if spec is None else replace(spec, kwargs={name: plain(value) for name, value in spec.kwargs.items()})
 
 
-def describe_environment(task: BaseModel, engine: TaskEngine, **more: Any) -> NDArray[np.uint8]:
+def describe_environment(task: BaseModel, engine: "TaskEngine", **more: Any) -> NDArray[np.uint8]:
     """What tells an environment from others whose state it could not go on from; more: facts beside task and robot."""
     parameters = {"kind": type(task).__name__, **plain(task)}
     facts = {"number of robots": engine.count, "task": parameters, "robot": plain(engine.robot), **more}
