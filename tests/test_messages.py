@@ -25,7 +25,12 @@ FOLDERS = {"caster_gym": Path(caster_gym.__path__[0]), "agents": Path(caster_gym
 COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 OPTIONS = {option for command in COMMANDS.values() for one in command.params for option in one.opts}
 STARTS = {"path", "time", "progress", "pose", "twist", "steering", "reset_mask"}  # of reset(options=…)
-OTHERS = {"psi": "a column of angles", "caster_gym": "the package itself", "made_of": "a part of saved states"}
+OTHERS = {
+    "psi": "a column of angles",
+    "caster_gym": "the package itself",
+    "made_of": "a part of saved states",
+    "constants": "of runtimes",
+}
 
 # each sentence that says what "would suffice", by the file that says it, and the test that does it
 PROMISES = {
