@@ -31,6 +31,7 @@ from caster_gym.report.tables import markdown_table
 INTERVAL = 0.2  # [s] between two states
 STUCK = 300.0  # [s] after which a process hangs
 CLOCKS = ("seconds", "validation/seconds", "time/fps", "time/time_elapsed")  # columns that tell the time of day
+DATED = (".png", ".svg", ".db", ".sqlite3")  # pictures and databases hold times
 SOURCE = Path(__file__).with_name("failing_writes.c")
 PATHS: dict[str, Any] = {"shape": "random_paths", "count": 3, "duration": 1.0, "max_speed": 0.3}
 TASK = {
@@ -79,11 +80,15 @@ def write_settings(folder: Path) -> dict[str, tuple[str, ...]]:
         (folder / f"{name}.yaml").write_text(yaml.safe_dump({**content, **COMMON}), encoding="utf-8")
     comparison = {"task": "task.yaml", "agents": ["ppo.yaml", "computed_torque"], "seeds": [0, 1]}
     (folder / "comparison.yaml").write_text(yaml.safe_dump(comparison), encoding="utf-8")
+    space = {"agent.gamma": {"low": 0.9, "high": 0.99}}
+    search = {"task": "plain.yaml", "agent": "shac.yaml", "space": space, "trials": 3}
+    (folder / "search.yaml").write_text(yaml.safe_dump(search), encoding="utf-8")
     return {
         "train ppo": ("train", "ppo.yaml", "--task", "task.yaml"),
         "train sac": ("train", "sac.yaml", "--task", "task.yaml"),
         "train shac": ("train", "shac.yaml", "--task", "plain.yaml"),
         "benchmark": ("benchmark", "--config", "comparison.yaml"),
+        "sweep": ("sweep", "search.yaml"),
     }
 
 
@@ -95,7 +100,7 @@ def content_of(folder: Path) -> dict[str, bytes]:
         if path.name in (".caster-gym", "run.yaml") or "tfevents" in name:
             continue
         kept[name] = without_clocks(path) if path.name in ("validation.csv", "progress.csv") else path.read_bytes()
-    return {name: one for name, one in kept.items() if not name.endswith((".png", ".svg"))}
+    return {name: one for name, one in kept.items() if not name.endswith(DATED)}
 
 
 def without_clocks(path: Path) -> bytes:

@@ -51,7 +51,7 @@ def write_results(folder: Path, sweep: Sweep, search: Search) -> str:
         [
             markdown_table(columns, lines, padded=True),
             *([f"The best {SHOWN} of {len(order)} trials; all are in trials.csv."] if len(order) > SHOWN else []),
-            f"Best is trial {best}, whose policies are in {places}. What mattered: {_in_words(search, sweep)}.",
+            f"Best is trial {best}, whose policies are in {places}. {_in_words(search, sweep)}.",
         ]
     )
     write_file(folder / "table.md", text + "\n")
@@ -80,7 +80,8 @@ def importances(search: Search, sweep: Sweep) -> dict[str, float]:
 
 def _in_words(search: Search, sweep: Sweep) -> str:
     found = sorted(importances(search, sweep).items(), key=lambda one: -one[1])
-    return ", ".join(f"{key} {100.0 * share:.0f} %" for key, share in found) or "too few trials tell"
+    shares = ", ".join(f"{key} {100.0 * share:.0f} %" for key, share in found)
+    return f"What mattered: {shares}" if shares else "There are too few trials to say what mattered"
 
 
 def _quantities(sweep: Sweep) -> list[tuple[str, Printed]]:

@@ -59,7 +59,7 @@ class SweepSettings(Frozen):
         for key in keys:
             owner, dot, name = key.partition(".")
             if owner not in OWNERS or not dot or not all(name.split(".")):
-                raise ValueError(f"keys begin with 'agent.' or 'task.', as agent.learning_rate, got {key!r}")
+                raise ValueError(f"keys name fields of 'agent' or 'task', as agent.learning_rate, got {key!r}")
         return keys
 
     @field_validator("storage")
