@@ -25,7 +25,7 @@ from caster_gym.agents.workers.calls import ATTEMPTS, Call, Finished, Reported, 
 from caster_gym.durable_files import FolderInUseError
 
 BEAT = 2.0  # [s] between signs of life
-SILENT = 60.0  # [s] without one, after which a call is begun elsewhere
+SILENT = 60.0  # [s] without one, usually
 LOCKED = 180.0  # [s] that storage may take to release what a lost machine had locked
 LOOK = 0.5  # [s] between looks at what is reported
 
@@ -40,11 +40,12 @@ class RayWorkers(Workers):
     """Tasks on the cluster of RAY_ADDRESS, on one that runs on this machine, or on a new one there.
 
     threads: cores that each call is given. places: calls that are given to Ray at a time; it runs as many of them as
-    the cluster has cores.
+    the cluster has cores. silent: [s] without a sign of life, after which a call is begun elsewhere.
     """
 
-    def __init__(self, threads: int, places: int) -> None:
+    def __init__(self, threads: int, places: int, silent: float = SILENT) -> None:
         self.places = places
+        self._silent = silent
         self._threads = threads
         self._calls: list[Call] = []
         self._waiting: deque[tuple[int, int]] = deque()  # numbers and attempts
@@ -58,7 +59,7 @@ class RayWorkers(Workers):
         if self._begun:
             ray.init(log_to_driver=False, logging_level=logging.ERROR, include_dashboard=False)
         here = NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
-        self._signs = ray.remote(_Signs).options(num_cpus=0, scheduling_strategy=here).remote()
+        self._signs = ray.remote(_Signs).options(num_cpus=0, scheduling_strategy=here).remote(self._silent)
         return self
 
     def submit(self, call: Call) -> int:
@@ -82,7 +83,7 @@ class RayWorkers(Workers):
                 if number in self._running:
                     self._avoided.add(machine)
                     ray.cancel(self._running[number].task, force=True)
-                    self._begin_again(self._running[number], f"nothing was heard for {SILENT:.0f} s")
+                    self._begin_again(self._running[number], f"nothing was heard for {self._silent:g} s")
 
     def _begin(self, number: int, attempt: int) -> None:
         call = self._calls[number]
@@ -141,7 +142,8 @@ class RayWorkers(Workers):
 class _Signs:
     """What is heard of calls; it lives on the machine of whoever has submitted them."""
 
-    def __init__(self) -> None:
+    def __init__(self, silent: float) -> None:
+        self._silent = silent
         self._reports: list[tuple[int, Any]] = []
         self._attempts: dict[int, int] = {}  # that is expected, by the numbers of calls
         self._heard: dict[int, tuple[float, str]] = {}  # when the last sign was given, and on which machine
@@ -163,7 +165,7 @@ class _Signs:
         """Reports since the last time, and the calls that fell silent, with their machines."""
         reports, self._reports = self._reports, []
         now = time.monotonic()
-        silent = [(number, machine) for number, (when, machine) in self._heard.items() if now - when > SILENT]
+        silent = [(number, machine) for number, (when, machine) in self._heard.items() if now - when > self._silent]
         for number, _ in silent:
             del self._heard[number]
         return reports, silent
