@@ -112,6 +112,16 @@ def test_an_arena_with_nothing_to_draw_stays_as_it_is():
     assert draw_beside(arena, HULLS["chung2008"], PATHS[0], 0) is arena
 
 
+def test_a_pose_that_is_held_gets_its_obstacles_too():
+    """A path of one pose has no direction but that of the robot."""
+    pose = np.array([[1.0, -2.0, 0.6, 0.8]])
+    one_each = read_arena({"beside": {"pillars": 1, "walls": 1, "gap": [LEAST, GREATEST]}})
+    arena = draw_beside(one_each, HULLS["tidybot2"], pose, 0)
+    gaps, _ = separations(HULLS["tidybot2"], pack([arena])[0], pose)
+    assert gaps.shape == (1, 2)
+    assert (gaps >= LEAST - ROUNDING).all() and (gaps <= GREATEST + ROUNDING).all()
+
+
 def test_a_robot_that_only_turns_gets_its_obstacles_too():
     angles = np.linspace(0.0, np.pi, 100)
     spot = np.stack([np.ones(100), np.ones(100), np.cos(angles), np.sin(angles)], -1)

@@ -74,8 +74,8 @@ def _track(hull: Hull, poses: Array) -> _Track:
     position, heading = poses[:, 0] + 1j * poses[:, 1], poses[:, 2] + 1j * poses[:, 3]
     steps, turns = np.diff(position), np.diff(heading)
     way = np.concatenate([[0.0], np.cumsum(np.abs(steps) + hull.reach * np.abs(turns))])
-    direction = np.append(steps, steps[-1:])
-    still = np.abs(direction) < ROUNDING  # where the path turns on the spot, every direction is beside it
+    direction = np.append(steps, steps[-1:] if len(steps) else 0.0)
+    still = np.abs(direction) < ROUNDING  # where a path turns on the spot, or is one pose, all directions are beside it
     direction = np.where(still, heading, direction)
     return _Track(hull, position, heading, direction / np.abs(direction), way)
 
