@@ -26,11 +26,20 @@ HEAVY = ("torch", "stable_baselines3", "matplotlib", "numba", "scipy", "mujoco")
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     """The wheel, built from a copy of what the sources need, so that the checkout stays as it is."""
-    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    return build(copy_sources(tmp_path_factory.mktemp("source")), tmp_path_factory.mktemp("wheel"))
+
+
+def copy_sources(folder):
+    """A folder with a copy of all that a wheel is made of."""
     for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source)
+        shutil.copy(ROOT / name, folder)
     for name in ("caster_gym", *HOMES):
-        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def build(source, out):
+    """The wheel of some sources."""
     pip("wheel", "--no-build-isolation", "--wheel-dir", out, source)
     (built,) = out.glob("*.whl")
     return built
@@ -85,6 +94,22 @@ def test_wheel_holds_every_source_and_every_configuration(wheel):
             files = (ROOT / top).rglob(pattern)
             expected |= {f"{home}/{file.relative_to(ROOT / top).as_posix()}" for file in files}
     assert expected - names == set()
+
+
+@pytest.mark.slow
+def test_the_same_sources_make_the_same_wheel_to_the_byte(wheel, tmp_path):
+    """In a checkout at another place, of another age, with other modes and by a user with another umask."""
+    (tmp_path / "a checkout at another place").mkdir()
+    other = copy_sources(tmp_path / "a checkout at another place")
+    for file in other.rglob("*"):
+        file.chmod(0o700 if file.is_dir() else 0o600)
+        os.utime(file, (1.5e9, 1.5e9))
+    before = os.umask(0o077)
+    try:
+        again = build(other, tmp_path / "out")
+    finally:
+        os.umask(before)
+    assert again.read_bytes() == wheel.read_bytes()
 
 
 @pytest.mark.slow
