@@ -34,6 +34,7 @@ OTHERWISE = {
     "caster_gym/report/figures.py": "draws into memory",
     "agents/learning/progress.py": "appends rows, and the saved state says how many of them count",
     "caster_gym/engines/native/compiled_files.py": "has checksums; what is lost is compiled again",
+    "caster_gym/engines/tensor/compiler.py": "makes a folder that goes with the process",
 }  # how modules write that call these, or open a file for writing, themselves
 OLD, NEW = "old " * 4000, "new " * 5000  # longer than a buffer
 

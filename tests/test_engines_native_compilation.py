@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from numba.core.errors import NumbaError
 
-from caster_gym.engines.native import compilation, compiled_files
+from caster_gym.engines import cache_folders
+from caster_gym.engines.native import compiled_files
 from caster_gym.engines.native.compilation import Work, compilations, included
 from caster_gym.engines.native.compiler import compiled
 
@@ -22,11 +23,17 @@ ANNOUNCEMENT = "caster_gym: compiling for {}, about {} s, once on this machine\n
 def cache(tmp_path, monkeypatch):
     """A folder of its own for compiled code, empty."""
     monkeypatch.setattr(compiled_files._SETTINGS, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(cache_folders, "_said", set())
+    (tmp_path / "cache").mkdir()
     return tmp_path / "cache"
 
 
 def doubled(x):
     return x + x
+
+
+def halved(x):
+    return x // 2
 
 
 def describe(types):
@@ -56,16 +63,19 @@ def test_what_is_in_the_cache_is_neither_compiled_nor_announced(capfd):
 
 
 def test_a_damaged_cache_is_mended(cache, capfd):
-    """Also by code that was kept under the name of another function."""
-    compiled(doubled, describe)(2)
-    (file,) = cache.rglob("*.nbc")
+    """Also by code that is whole and no pickle, or was kept under the name of another function; one line tells it."""
+    compiled(doubled, describe)(2), compiled(halved, describe)(2)
+    file, other = sorted(cache.rglob("*.nbc"), key=lambda file: "halved" in file.name)
     content = file.read_bytes()
-    for wrong in (content[:100], compiled_files._checksum(b"no pickle") + b"no pickle"):
+    for wrong in (content[:100], compiled_files._checksum(b"no pickle") + b"no pickle", other.read_bytes()):
         file.write_bytes(wrong)
+        cache_folders._said.clear()
         capfd.readouterr()
         assert compiled(doubled, describe)(2) == 4
-        assert "compiling for a test" in capfd.readouterr().err
-        assert file.read_bytes()[:4] != wrong[:4] or len(file.read_bytes()) > len(wrong)
+        told = capfd.readouterr().err.splitlines()
+        assert len(told) == 2 and "is damaged" in told[0] and "compiling for a test" in told[1]
+        assert file.read_bytes()[compiled_files._CHECKSUM :] != wrong[compiled_files._CHECKSUM :]
+        assert compiled(doubled, describe)(2) == 4 and capfd.readouterr().err == ""
 
 
 def test_what_belongs_to_an_announcement_is_not_announced_again(capfd):
@@ -74,19 +84,26 @@ def test_what_belongs_to_an_announcement_is_not_announced_again(capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_cache_that_cannot_be_kept_is_told_once(monkeypatch, tmp_path, capfd):
+def test_a_cache_that_cannot_be_kept_is_told_once(monkeypatch, cache, tmp_path, capfd):
     """The advice helps: with a folder that can be written, nothing is said."""
-    monkeypatch.setattr(compilation, "_complained", False)
     (tmp_path / "file").touch()
     monkeypatch.setattr(compiled_files, "roots", lambda: iter([tmp_path / "file"]))
     function = compiled(doubled, describe)
-    function(2), function(2.0)
+    assert (function(2), function(2.0)) == (4, 4.0)
     told = capfd.readouterr().err
-    assert told.count("set NUMBA_CACHE_DIR to a folder that can be written") == 1
-    monkeypatch.setattr(compiled_files, "roots", lambda: iter([tmp_path / "cache"]))
-    monkeypatch.setattr(compilation, "_complained", False)
+    assert told.count("cannot be kept") == told.count("set NUMBA_CACHE_DIR to a folder that can be written") == 1
+    monkeypatch.setattr(compiled_files, "roots", lambda: iter([cache]))
+    cache_folders._said.clear()
     compiled(doubled, describe)(2)
     assert "NUMBA_CACHE_DIR" not in capfd.readouterr().err
+
+
+def test_without_any_folder_it_runs_with_one_warning(monkeypatch, capfd):
+    """As where home can only be read and there are no temporary files."""
+    monkeypatch.setattr(compiled_files, "roots", lambda: iter([]))
+    function = compiled(doubled, describe)
+    assert (function(2), function(2.0)) == (4, 4.0)
+    assert capfd.readouterr().err.count("cannot be kept") == 1
 
 
 def broken(x):

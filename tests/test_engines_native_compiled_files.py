@@ -1,17 +1,28 @@
 """caster_gym.engines.native.compiled_files and .turns: compiled code on disk, shared by environments and processes."""
 
+import errno
 import os
 import stat
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import pytest
 
+from caster_gym.engines import cache_folders
 from caster_gym.engines.native import compiled_files, turns
 from caster_gym.engines.native.turns import take_turn
 
 DAY = 86400.0
+ROOT = Path(__file__).resolve().parent.parent
+LEAVE_UNFINISHED = """
+import sys
+from pathlib import Path
+from caster_gym.durable_files import temporary_name
+(Path(sys.argv[1]) / temporary_name()).write_bytes(b"half")
+"""
 
 
 @pytest.fixture
@@ -20,6 +31,7 @@ def root(tmp_path, monkeypatch):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     monkeypatch.setattr(compiled_files._SETTINGS, "CACHE_DIR", str(tmp_path / "chosen"))
+    monkeypatch.setattr(cache_folders, "_said", set())
     return tmp_path / "chosen"
 
 
@@ -59,11 +71,55 @@ def test_what_is_kept_is_read(root):
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", None])
-def test_a_damaged_file_is_as_good_as_none(root, damage):
+def test_a_damaged_file_is_removed_and_one_line_says_so(root, damage, capsys):
     """As after a crash or on a full disk: half of a function would take the process down."""
+    for name in ("step.nbc", "look.nbc"):
+        compiled_files.keep(name, b"code")
+        file = root / compiled_files.version() / name
+        file.write_bytes(file.read_bytes()[:-1] if damage is None else damage)
+        assert compiled_files.read(name) is None
+        assert not file.exists()
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "step.nbc is damaged" in told and "compiled again" in told
+
+
+def test_code_that_others_can_have_written_is_removed_unread(root):
+    """Its content would be right, which anybody can see to who can write it."""
     compiled_files.keep("step.nbc", b"code")
     file = root / compiled_files.version() / "step.nbc"
-    file.write_bytes(file.read_bytes()[:-1] if damage is None else damage)
+    file.chmod(0o666)
+    assert compiled_files.read("step.nbc") is None
+    assert not file.exists()
+
+
+def test_a_link_to_code_is_not_followed(root, tmp_path):
+    compiled_files.keep("step.nbc", b"code")
+    file = root / compiled_files.version() / "step.nbc"
+    file.rename(tmp_path / "elsewhere.nbc")
+    file.symlink_to(tmp_path / "elsewhere.nbc")
+    assert compiled_files.read("step.nbc") is None
+    assert not file.is_symlink() and (tmp_path / "elsewhere.nbc").exists()
+
+
+def test_what_a_killed_process_has_left_unfinished_goes(root):
+    folder = root / compiled_files.version()
+    folder.mkdir(parents=True)
+    gone = subprocess.run([sys.executable, "-c", LEAVE_UNFINISHED, str(folder)], check=True, cwd=ROOT)
+    assert gone.returncode == 0 and len(list(folder.iterdir())) == 1
+    compiled_files.keep("step.nbc", b"code")
+    assert [file.name for file in folder.iterdir()] == ["step.nbc"]
+
+
+def full(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_on_a_full_disk_nothing_is_kept_and_nothing_is_left(root, tmp_path, monkeypatch):
+    """Of the file that was begun no piece stays, in neither folder."""
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OSError, match="No space left"):
+        compiled_files.keep("step.nbc", b"code")
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == []
     assert compiled_files.read("step.nbc") is None
 
 
@@ -95,23 +151,9 @@ def test_a_cache_that_cannot_be_written_serves_all_the_same(root, tmp_path):
 def test_without_any_folder_nothing_is_kept(tmp_path, root, monkeypatch):
     root.write_text("no folder can be made in a file")
     monkeypatch.setattr(tempfile, "tempdir", str(root))
-    with pytest.raises(OSError, match="chosen"):
+    with pytest.raises(OSError, match="there is no folder that only this user can write to"):
         compiled_files.keep("step.nbc", b"code")
     assert compiled_files.read("step.nbc") is None
-
-
-@pytest.mark.parametrize("mode", [0o777, 0o770])
-def test_code_is_not_run_from_a_folder_that_others_can_write(root, tmp_path, mode):
-    foreign = tmp_path / "temporary" / f"caster_gym-{os.getuid()}"
-    foreign.mkdir()
-    foreign.chmod(mode)
-    assert list(compiled_files.roots()) == [root]
-
-
-def test_code_is_not_run_from_a_link(root, tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "temporary" / f"caster_gym-{os.getuid()}").symlink_to(tmp_path / "elsewhere")
-    assert list(compiled_files.roots()) == [root]
 
 
 def test_code_of_sources_that_have_changed_since_is_not_kept(root, monkeypatch):

@@ -10,7 +10,7 @@ import numpy as np
 from caster_gym.agents.comparison.task_settings import ChosenTask, TaskSettings
 from caster_gym.arena.arena import Arena
 from caster_gym.engines.native.compilation import compilations, included
-from caster_gym.engines.native.compiled_files import roots, version
+from caster_gym.engines.native.compiled_files import version_folder
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.robot import Robot, load_robot
 from caster_gym.shipped_files import names_of, read_settings
@@ -70,7 +70,7 @@ def warm(pieces: Sequence[Piece], report: Callable[[int, str], None]) -> Warmed:
             piece.run()
         compiled += compilations() > before
     report(len(pieces), "")
-    return Warmed(len(pieces), compiled, str(next(roots()) / version()))
+    return Warmed(len(pieces), compiled, str(version_folder() or "memory alone, since there is no folder for them"))
 
 
 def _of_task(robot: Robot, task: ChosenTask) -> list[Piece]:

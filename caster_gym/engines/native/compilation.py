@@ -7,7 +7,6 @@ will be compiled now: this is the only moment at which an announcement is sure t
 import hashlib
 import multiprocessing
 import pickle
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any, NamedTuple
 from numba.core import compiler, event, serialize
 from numba.core.caching import _Cache
 
+from caster_gym.engines.cache_folders import say, say_once
 from caster_gym.engines.native import compiled_files
 from caster_gym.engines.native.outside_sources import outside_digest
 from caster_gym.engines.native.turns import Turn, take_turn
@@ -36,7 +36,6 @@ Describe = Callable[[tuple[Any, ...]], Work]  # from the types of a function's a
 
 _included = False  # in an announcement that has been made
 _count = 0  # of specialisations that this process has begun to compile
-_complained = False
 
 
 def compilations() -> int:
@@ -70,8 +69,8 @@ class SharedCache(_Cache):
 
     @property
     def cache_path(self) -> str:
-        """Folder of this version."""
-        return str(next(compiled_files.roots()) / compiled_files.version())
+        """Folder of this version; empty if there is none."""
+        return str(compiled_files.version_folder() or "")
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The specialisation as it was kept, or None: then Numba compiles it as soon as this returns."""
@@ -87,32 +86,31 @@ class SharedCache(_Cache):
 
         def on_waiting() -> None:
             if multiprocessing.parent_process() is None:  # workers share a terminal with whoever compiles
-                _say(f"another process is compiling for {work.what}, waiting for it")
+                say(f"another process is compiling for {work.what}, waiting for it")
 
         self._end_turn()
-        if key:
-            self._turn = take_turn(Path(self.cache_path) / f"{_file_name(self._function, key)}.turn", on_waiting)
+        folder = compiled_files.version_folder()
+        if key and folder is not None:
+            self._turn = take_turn(folder / f"{_file_name(self._function, key)}.turn", on_waiting)
             found = self._load(key, target_context)  # which another process may just have kept
         if found is not None:
             self._end_turn()
             return found
         _count += 1
         if not _included:
-            _say(f"compiling for {work.what}, about {_rounded(work.seconds)} s, once on this machine")
+            say(f"compiling for {work.what}, about {_rounded(work.seconds)} s, once on this machine")
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what has just been compiled."""
-        global _complained
         try:
             if self._enabled and not data.library.has_dynamic_globals:
                 key = self._key(sig, data.codegen)
                 if key:
                     compiled_files.keep(_file_name(self._function, key), _dumps((key, data._reduce())))
         except OSError as error:
-            if not _complained:
-                _complained = True
-                _say(f"what was compiled cannot be kept ({error}): set NUMBA_CACHE_DIR to a folder that can be written")
+            advice = "set NUMBA_CACHE_DIR to a folder that can be written, and where others cannot write"
+            say_once(f"what was compiled cannot be kept ({error}): {advice}", "cannot be kept")
         finally:
             self._end_turn()
 
@@ -133,14 +131,18 @@ class SharedCache(_Cache):
             self._end_turn()
 
     def _load(self, key: str, target_context: Any) -> Any:
-        content = compiled_files.read(_file_name(self._function, key))
+        name = _file_name(self._function, key)
+        content = compiled_files.read(name)
         if content is None:
             return None
         try:
             kept, parts = pickle.loads(content)
-            return _CompileResult._rebuild(target_context, *parts) if kept == key else None
+            if kept == key:
+                return _CompileResult._rebuild(target_context, *parts)
         except Exception:  # whatever is wrong with what another process has left, compiling anew mends it
-            return None
+            pass
+        compiled_files.remove(name)
+        return None
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """All that a specialisation depends on, beside the version: its types, sources from outside, the processor.
@@ -199,7 +201,3 @@ def _file_name(function: Callable[..., Any], key: str) -> str:
 
 def _rounded(seconds: float) -> int:
     return round(seconds) if seconds < 5.0 else 5 * round(seconds / 5.0)
-
-
-def _say(sentence: str) -> None:
-    print(f"caster_gym: {sentence}", file=sys.stderr, flush=True)

@@ -1,21 +1,20 @@
-"""The folder of compiled code on disk, shared by environments with the same sources, Python and Numba.
+"""The files of compiled code on disk, shared by environments with the same sources, Python and Numba.
 
 Numba's own cache depends on where a package is installed, so that each virtual environment would compile anew, and two
 processes that save different code of one function at the same time may leave it under the wrong name. Here every
 specialisation has a file of its own, whose name follows from what was compiled. The first folder that can be written
-gets what is new; a cache that can only be read, in a container's image or of another user, serves all the same.
+gets what is new; a cache that can only be read, such as root's in a container's image, serves all the same. Reading a
+file runs code in it, so that only those are read which nobody else can have written; see `cache_folders`.
 """
 
 import hashlib
 import os
 import re
 import shutil
-import stat
 import sys
-import tempfile
 import time
-import uuid
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,8 @@ import numba
 import numpy as np
 
 import caster_gym
+from caster_gym.durable_files import remove_leftovers, temporary_name
+from caster_gym.engines.cache_folders import cache_folders, is_trusted, say_once
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 _SETTINGS: Any = numba.config  # makes its attributes at run time
@@ -34,15 +35,18 @@ KEPT_DAYS = 60.0  # without use
 _DAY = 86400.0  # s
 _OF_A_VERSION = re.compile(r"(cpython-\d+\w*-)?[0-9a-f]{16}")  # names of the folders that may be removed
 _CHECKSUM = 16  # bytes in front of each file
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+_READ = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
 def roots() -> Iterator[Path]:
-    """Folders for compiled code, the best first: NUMBA_CACHE_DIR, or the user's cache folder; then a temporary one."""
-    chosen = _SETTINGS.CACHE_DIR
-    yield Path(chosen) if chosen else _of_the_user()
-    temporary = Path(tempfile.gettempdir()) / f"caster_gym-{_user()}"
-    if _is_ours(temporary):
-        yield temporary
+    """Trusted folders for compiled code, the best first: NUMBA_CACHE_DIR or the user's cache; then a temporary one."""
+    return cache_folders(_SETTINGS.CACHE_DIR)
+
+
+def version_folder() -> Path | None:
+    """Where code of this version is kept first of all; None if there is no folder for it."""
+    return next((root / version() for root in roots()), None)
 
 
 def source_digest() -> str:
@@ -68,17 +72,27 @@ def version() -> str:
 
 
 def read(name: str) -> bytes | None:
-    """Content of a file that some process has kept, if it is there and whole."""
+    """Content of a file that some process has kept, if it is there and whole; one that is damaged is removed."""
     for root in roots():
         folder = root / version()
         try:
-            content = (folder / name).read_bytes()
-        except OSError:
+            content = _trusted_content(folder / name)
+        except FileNotFoundError:
             continue
+        except OSError:  # a link, a folder, or of somebody else
+            content = b""
         if _checksum(content[_CHECKSUM:]) == content[:_CHECKSUM]:
             _note_use(folder)
             return content[_CHECKSUM:]
+        _remove(folder / name)
     return None
+
+
+def remove(name: str) -> None:
+    """Remove a file whose content, although whole, is not what its name says."""
+    for root in roots():
+        if os.path.lexists(root / version() / name):
+            _remove(root / version() / name)
 
 
 def keep(name: str, content: bytes) -> None:
@@ -88,41 +102,55 @@ def keep(name: str, content: bytes) -> None:
     """
     if source_digest() != SOURCES:
         return
-    failures = []
+    failure = OSError("there is no folder that only this user can write to")
     for root in roots():
         folder = root / version()
-        unfinished = folder / f"{uuid.uuid4().hex}.part"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            unfinished.write_bytes(_checksum(content) + content)
-            unfinished.replace(folder / name)
+            folder.mkdir(mode=0o755, exist_ok=True)
+            _write(folder / name, _checksum(content) + content)
         except OSError as error:
-            unfinished.unlink(missing_ok=True)
-            failures.append(error)
+            failure = error
             continue
         _remove_old_versions(root)
         return
-    raise failures[0]
+    raise failure
 
 
-def _of_the_user() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "caster_gym"
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-
-
-def _is_ours(folder: Path) -> bool:
-    """Whether a folder, made if need be, is one in which nobody else can leave code for us to run."""
+def _trusted_content(file: Path) -> bytes:
+    """Content of a file that nobody else can have written. Raises OSError."""
+    handle = os.open(file, _READ)
     try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
-    except OSError:
-        return False
-    if not hasattr(os, "getuid"):
-        return stat.S_ISDIR(found.st_mode)
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+        if not is_trusted(os.fstat(handle)):
+            raise PermissionError(f"others can write to {file}")
+        with os.fdopen(handle, "rb", closefd=False) as opened:
+            return opened.read()
+    finally:
+        os.close(handle)
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Write a file, all of it or nothing, that only this user can write again."""
+    remove_leftovers(file.parent)
+    unfinished = file.with_name(temporary_name())
+    try:
+        with os.fdopen(os.open(unfinished, _NEW, 0o644), "wb") as opened:
+            opened.write(content)
+        unfinished.replace(file)
+    except BaseException:
+        with suppress(OSError):
+            unfinished.unlink()
+        raise
+
+
+def _remove(file: Path) -> None:
+    """Remove what is not to be read again, and say so, once for all that is found."""
+    what = f"{file} is damaged, or not of this user"
+    try:
+        file.unlink()
+    except OSError as error:
+        say_once(f"{what}: it is left aside, since it cannot be removed ({error.strerror})", "damage")
+    else:
+        say_once(f"{what}: it was removed and is compiled again, as are others like it", "damage")
 
 
 def _checksum(content: bytes) -> bytes:
@@ -141,7 +169,7 @@ def _note_use(folder: Path) -> None:
 def _remove_old_versions(root: Path) -> None:
     """Remove folders of versions that nobody has used for long, and the longest unused of too many."""
     others = []
-    for folder in root.iterdir():
+    for folder in _inside(root):
         if _OF_A_VERSION.fullmatch(folder.name) and folder.name != version():
             try:
                 others.append((folder.stat().st_mtime, folder))
@@ -151,3 +179,10 @@ def _remove_old_versions(root: Path) -> None:
     for i, (used, folder) in enumerate(others):
         if i >= KEPT_VERSIONS or time.time() - used > KEPT_DAYS * _DAY:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _inside(root: Path) -> list[Path]:
+    try:
+        return list(root.iterdir())
+    except OSError:
+        return []

@@ -1,15 +1,23 @@
 """Torch's compiler, and CUDA graphs where they help."""
 
+import atexit
+import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import torch
 from torch.utils import _pytree as pytree
 
+from caster_gym.engines.cache_folders import cache_folders, fault_of, say_once
+
 FUSED = 1_000_000  # intermediate values in one kernel of the CPU: past 64, the usual limit, they would go to memory
 READS = 1  # arrays behind a value that is worked out anew for each use: the usual 4 take the compiler twice as long
 _KEPT = {"inplace_buffers": False, "allow_buffer_reuse": False}  # else gradients come out wrong (Torch 2.13)
+_CACHE_VARIABLE = "TORCHINDUCTOR_CACHE_DIR"
 _said: list[str] = []  # by this process
 
 
@@ -26,12 +34,41 @@ def compiled(function: Callable[..., Any], device: torch.device, graphs: bool = 
         options |= {"max_fusion_size": FUSED, "realize_reads_threshold": READS}
     else:
         options["triton.cudagraphs"] = graphs
+    choose_cache()
     announce_compilation()
     compile_: Any = torch.compile  # whose declared types lack the last argument
     made: Callable[..., Any] = compile_(
         function, fullgraph=True, dynamic=False, options=options, isolate_recompiles=True
     )
     return made
+
+
+def choose_cache() -> None:
+    """Let Torch keep compiled code where nobody else can put code for us to run, unless the user says where.
+
+    Left alone, Torch takes whatever lies in a folder of a known name in /tmp. Where there is no trusted folder, it gets
+    a new one that goes with this process. What Triton compiles lies beneath it too.
+    """
+    chosen = Path(os.environ.get(_CACHE_VARIABLE, ""))
+    of_torch = chosen.name.startswith("torchinductor_") and chosen.parent == Path(tempfile.gettempdir())
+    if chosen.name and not of_torch:  # which Torch puts there itself when it is first used
+        _warn_of(chosen)
+        return
+    root = next(cache_folders(os.environ.get("NUMBA_CACHE_DIR")), None)
+    if root is None:
+        folder = Path(tempfile.mkdtemp(prefix="caster_gym-"))
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    else:
+        folder = root / "torch"
+    os.environ[_CACHE_VARIABLE] = str(folder)
+
+
+def _warn_of(chosen: Path) -> None:
+    """Say it if others can put code into the folder that the user has named."""
+    folder = chosen.resolve()
+    fault = fault_of(next(place for place in (folder, *folder.parents) if place.exists()))
+    if fault is not None:
+        say_once(f"Torch runs code that it finds in {_CACHE_VARIABLE}={chosen}: {fault}")
 
 
 def announce_compilation() -> None:
