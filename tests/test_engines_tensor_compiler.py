@@ -40,7 +40,8 @@ def test_the_folder_that_a_user_names_is_taken_and_told_of_if_others_can_write_t
     choose_cache()
     assert (os.environ[VARIABLE], capsys.readouterr().err) == (str(named), "")
     named.chmod(0o777)
-    choose_cache(), choose_cache()
+    choose_cache()
+    choose_cache()
     assert os.environ[VARIABLE] == str(named)
     assert capsys.readouterr().err == (
         f"caster_gym: Torch runs code that it finds in {VARIABLE}={named}: others can write to {named} (mode 0777)\n"
