@@ -13,7 +13,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # there is one worker for each core
 
 # What needs packages of the extra `scale`, where those are not installed; `dev` has them
 collect_ignore_glob = [
-    *(["test_agents_sweep_s*.py"] if find_spec("optuna") is None else []),
+    *(["test_agents_sweep_s*.py", "test_measure_scaling.py"] if find_spec("optuna") is None else []),
     *(["test_agents_workers_on_ray.py"] if find_spec("ray") is None else []),
 ]
 

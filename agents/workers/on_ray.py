@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import ray
+from ray import cloudpickle
 from ray.exceptions import RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
@@ -52,6 +53,7 @@ class RayWorkers(Workers):
         self._running: dict[int, _Running] = {}  # by number
         self._avoided: set[str] = set()  # machines that fell silent
         self._signs: Any = None
+        self._work: Any = ray.remote(_work)
 
     def __enter__(self) -> Self:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -88,8 +90,8 @@ class RayWorkers(Workers):
     def _begin(self, number: int, attempt: int) -> None:
         call = self._calls[number]
         ray.get(self._signs.expect.remote(number, attempt))
-        work = pickle.dumps(call.work(attempt))
-        task = ray.remote(_work).options(
+        work = cloudpickle.dumps(call.work(attempt))  # functions of a script by their code
+        task = self._work.options(
             name=call.name, num_cpus=self._threads, max_retries=0, scheduling_strategy=self._elsewhere()
         )
         reference = task.remote(work, [*sys.path], [*sys.argv], self._signs, number, attempt)
