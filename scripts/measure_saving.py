@@ -23,7 +23,7 @@ from caster_gym.report.provenance import command_line, versions_in_words
 from caster_gym.report.tables import markdown_table
 from caster_gym.shipped_files import read_settings
 
-AGENTS = ("ppo", "sac", "shac", "rsl_ppo")
+AGENTS = ("ppo", "sac", "shac")
 
 
 class Enough(Exception):  # noqa: N818  # no error: the time is over
