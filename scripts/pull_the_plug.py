@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -236,13 +237,14 @@ def pull(kills: int, seed: int, names: Sequence[str] | None = None) -> tuple[lis
         commands = write_settings(folder)
         library = build_library(folder)
         works = [run_undisturbed(name, commands[name], folder) for name in names or commands]
-        while bar.n < kills:
-            work = works[runs % len(works)]
-            met += disturb(work, folder, library, generator)
-            different += [f"{work.name}: {name}" for name in differing(work, folder)]
-            shutil.rmtree(folder / "run")
-            runs += 1
-            bar.update(sum(one.how == "kill" for one in met) - bar.n)
+        with suppress(KeyboardInterrupt):  # what was seen so far is reported
+            while bar.n < kills:
+                work = works[runs % len(works)]
+                met += disturb(work, folder, library, generator)
+                different += [f"{work.name}: {name}" for name in differing(work, folder)]
+                shutil.rmtree(folder / "run")
+                runs += 1
+                bar.update(sum(one.how == "kill" for one in met) - bar.n)
     return met, different, runs
 
 
