@@ -16,9 +16,10 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ import yaml
 from tqdm import tqdm
 
 from caster_gym.durable_files import write_file
+from caster_gym.engines.native.cores import usable_cores
 from caster_gym.report.provenance import command_line, versions_in_words
 from caster_gym.report.tables import markdown_table
 
@@ -229,23 +231,57 @@ def build_library(folder: Path) -> Path | None:
     return library
 
 
-def pull(kills: int, seed: int, names: Sequence[str] | None = None) -> tuple[list[Disturbance], list[str], int]:
-    """Disturb all commands in turns, until there were so many kills; what happened, files that differ, and runs."""
-    generator, met, different, runs = random.Random(seed), list[Disturbance](), list[str](), 0
+class Tally:
+    """What several threads have met so far."""
+
+    def __init__(self, bar: "tqdm[Any]") -> None:
+        self.met: list[Disturbance] = []
+        self.different: list[str] = []
+        self.runs = 0
+        self.stopped = False
+        self._bar, self._lock = bar, threading.Lock()
+
+    def add(self, met: Sequence[Disturbance], different: Sequence[str]) -> None:
+        """Count a run that was disturbed until it was done."""
+        with self._lock:
+            self.met += met
+            self.different += different
+            self.runs += 1
+            self._bar.update(self.kills - self._bar.n)
+
+    @property
+    def kills(self) -> int:
+        """How many processes were killed."""
+        return sum(one.how == "kill" for one in self.met)
+
+
+def pull(kills: int, seed: int, names: Sequence[str] | None = None) -> Tally:
+    """Disturb all commands in turns, one on each core, until there were so many kills."""
     with tempfile.TemporaryDirectory() as place, tqdm(total=kills, desc="kills", disable=None) as bar:
-        folder = Path(place)
-        commands = write_settings(folder)
-        library = build_library(folder)
-        works = [run_undisturbed(name, commands[name], folder) for name in names or commands]
-        with suppress(KeyboardInterrupt):  # what was seen so far is reported
-            while bar.n < kills:
-                work = works[runs % len(works)]
-                met += disturb(work, folder, library, generator)
-                different += [f"{work.name}: {name}" for name in differing(work, folder)]
-                shutil.rmtree(folder / "run")
-                runs += 1
-                bar.update(sum(one.how == "kill" for one in met) - bar.n)
-    return met, different, runs
+        tally = Tally(bar)
+        library = build_library(Path(place))
+        folders = [Path(place) / str(number) for number in range(usable_cores())]
+        for folder in folders:
+            folder.mkdir()
+            commands = write_settings(folder)
+        chosen = list(names or commands)
+        works = [run_undisturbed(name, commands[name], folders[0]) for name in chosen]
+
+        def disturb_in_turns(number: int) -> None:
+            generator, turn = random.Random(f"{seed} {number}"), number
+            while tally.kills < kills and not tally.stopped:
+                work = works[turn % len(works)]
+                met = disturb(work, folders[number], library, generator)
+                tally.add(met, [f"{work.name}: {name}" for name in differing(work, folders[number])])
+                shutil.rmtree(folders[number] / "run")
+                turn += 1
+
+        with ThreadPoolExecutor(len(folders)) as threads:
+            try:
+                list(threads.map(disturb_in_turns, range(len(folders))))
+            except KeyboardInterrupt:  # what was seen so far is reported, once the present runs are done
+                tally.stopped = True
+        return tally
 
 
 def page(met: Sequence[Disturbance], different: Sequence[str], runs: int, command: str) -> str:
@@ -282,8 +318,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", nargs="+", help="commands to disturb, such as 'train ppo'")
     parser.add_argument("--out", type=Path, help="folder for kills.md")
     options = parser.parse_args(arguments)
-    met, different, runs = pull(options.kills, options.seed, options.only)
-    text = page(met, different, runs, command_line("scripts.pull_the_plug", arguments))
+    tally = pull(options.kills, options.seed, options.only)
+    different = tally.different
+    text = page(tally.met, different, tally.runs, command_line("scripts.pull_the_plug", arguments))
     print(text)
     if different:
         sys.exit("\n".join(["these files differ:", *different]))
