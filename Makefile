@@ -12,7 +12,7 @@ LOWEST_TESTS := configuration robot packaging arena_arena paths_shapes paths_spl
   engines_native_compiled_files tasks_track_environment agents_comparison_task_settings \
   agents_learning_bundle report_run_folder wrappers_specification
 
-.PHONY: help install benchmark pictures papers test quick papers-test lowest lint style format clean
+.PHONY: help install benchmark pictures papers test quick papers-test lowest lock audit lint style format clean
 .DEFAULT_GOAL := help
 
 help: ## This list
@@ -68,4 +68,4 @@ format: $(INSTALLED) ## Bring the sources into shape
 	$(BIN)/ruff format
 
 clean: ## Remove the environment and caches, keep runs/
-	rm -rf .venv $(LOWEST) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-lock $(LOWEST) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
