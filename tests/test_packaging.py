@@ -238,7 +238,9 @@ def test_the_lowest_versions_tested_are_those_declared():
 def test_all_that_the_checks_install_is_locked_with_hashes():
     """`make lock` makes requirements.lock, and from it the versions for pip, which takes no hashes beside `-e`."""
     text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
-    locked = re.findall(r"^(([\w.-]+)==[^\\\n]*?) *\\\n((?: +--hash=sha256:[0-9a-f]{64}(?: \\)?\n)+)", text, re.MULTILINE)
+    locked = re.findall(
+        r"^(([\w.-]+)==[^\\\n]*?) *\\\n((?: +--hash=sha256:[0-9a-f]{64}(?: \\)?\n)+)", text, re.MULTILINE
+    )
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     assert [line for line, _, _ in locked] == lines == re.findall(r"^(\w.*?) *\\$", text, re.MULTILINE)
     names = {name for _, name, _ in locked}
