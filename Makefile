@@ -56,6 +56,18 @@ $(LOWEST)/installed: pyproject.toml setup.py constraints-lowest.txt
 	$(LOWEST)/bin/python -m pip install --quiet -c constraints-lowest.txt -e '.[test]'
 	@touch $@
 
+lock: ## requirements.lock and constraints.txt made again; LOCK=--upgrade takes the newest versions
+	$(PYTHON) -m venv .venv-lock
+	.venv-lock/bin/python -m pip install --quiet uv==0.13.9
+	.venv-lock/bin/uv pip compile --quiet --extra dev --universal --generate-hashes --no-annotate --no-header $(LOCK) \
+	  pyproject.toml --output-file requirements.lock
+	@sed -n 's/^\([a-z0-9].*[^ ]\) *\\$$/\1/p' requirements.lock > constraints.txt
+
+audit: ## Known vulnerabilities of the locked versions, by PyPI; fails too where it cannot be asked
+	$(PYTHON) -m venv .venv-lock
+	.venv-lock/bin/python -m pip install --quiet pip-audit==2.10.1
+	.venv-lock/bin/pip-audit --strict --disable-pip --require-hashes --requirement requirements.lock
+
 lint: style ## Style and types
 	$(BIN)/mypy
 
