@@ -1,5 +1,6 @@
 """bounded_files: only regular files of a bounded size are read, and nothing that is none is waited for."""
 
+import ast
 import os
 import socket
 import sys
@@ -8,6 +9,15 @@ from pathlib import Path
 import pytest
 
 from caster_gym.bounded_files import expanded, read_bytes
+
+OWN = {  # who reads files elsewhere, and which
+    "caster_gym/engines/native": "what the system and Python know, and what was compiled here",
+    "caster_gym/durable_files.py": "locks of our own",
+    "agents/control/protocol.py": "the source of a class that is loaded already",
+    "agents/learning/saved_state.py": "the state of a training of one's own",
+    "agents/learning/replay_files.py": "the state of a training of one's own",
+    "agents/learning/progress.py": "the state of a training of one's own",
+}
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such files")
 
@@ -71,3 +81,24 @@ def test_homes_are_expanded(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     assert expanded("~/runs") == tmp_path / "runs"
+
+
+def test_all_other_files_are_read_here():
+    root, found = Path(__file__).parents[1], set()
+    for folder in ("caster_gym", "agents"):
+        for file in sorted((root / folder).rglob("*.py")):  # which does not follow the links in caster_gym
+            name = file.relative_to(root).as_posix()
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Call) and _reads(node) and not name.startswith(tuple(OWN)):
+                    found.add(name)
+    assert found == set()
+
+
+def _reads(call):
+    """Whether a call reads a file, or opens one without saying that it is to be written."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    modes = {one.value for one in [*call.args, *(one.value for one in call.keywords)] if isinstance(one, ast.Constant)}
+    module = getattr(getattr(call.func, "value", None), "id", "")
+    opened = name == "open" and module not in ("os", "Image") and not modes & {"w", "a", "x", "wb", "ab", "xb"}
+    method = isinstance(call.func, ast.Attribute) and name in {"read_text", "read_bytes"}
+    return method or opened or name in {"loadtxt", "genfromtxt", "load_file", "safe_open"}
