@@ -143,7 +143,7 @@ class Table:
             stamps = [Decimal(row[place].strip()) for row in self.rows]
         except InvalidOperation:
             stamps = []
-        if not stamps or not all(stamp.is_finite() and abs(stamp) <= _LATEST for stamp in stamps):
+        if not stamps or not all(stamp.is_finite() and stamp.copy_abs() <= _LATEST for stamp in stamps):
             stamps = [Decimal(self._number(row, place, _LATEST)) for row in range(len(self.rows))]
         name = self.columns[place].name
         if not declared and stamps and stamps[0] > LATEST_SECONDS:

@@ -25,7 +25,7 @@ from scripts.fuzzing.page import page
 from scripts.fuzzing.trials import SLOW, Tally, Trials, work
 
 CHUNK = 500  # inputs that a process is asked for at a time
-PATIENCE = 20.0  # [s] after which a process that is still busy with one input is ended
+PATIENCE = 120.0  # [s] after which a process that is still busy with one input is ended; the machine may be busy too
 
 
 class _Worker:

@@ -111,6 +111,7 @@ def test_many_times_that_are_far_apart_are_hardly_seconds_unless_that_is_said():
         ("1", "1e16", "line 3: 'x' must be a number up to 1e.15, got '1e16'"),
         ("1", "1e999", "line 3: 'x' must be a finite number, got '1e999'"),
         ("1e999999", "1", "line 3: 'time' must be a finite number, got '1e999999'"),
+        ("1e9999999", "1", "line 3: 'time' must be a finite number, got '1e9999999'"),
         ("1e23", "1", "line 3: 'time' must be a number up to 1e.22, got '1e23'"),
     ],
 )
