@@ -150,6 +150,21 @@ def test_a_state_that_is_none_says_so(undisturbed, tmp_path):
         train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
 
 
+def test_the_state_of_another_training_says_so(undisturbed, tmp_path):
+    """As when folders were mixed up by hand."""
+    shutil.copytree(undisturbed("rsl_ppo")[1][0], tmp_path / "run")
+    shutil.copytree(undisturbed("shac")[1][0] / "state", tmp_path / "run" / "state", dirs_exist_ok=True)
+    with pytest.raises(ConfigurationError, match="is the state of another training: delete it to begin anew"):
+        train(ON_TENSORS, LEARNERS["rsl_ppo"], 3, tmp_path / "run", nothing, resume=True)
+
+
+def test_a_record_that_was_deleted_says_so(undisturbed, tmp_path):
+    shutil.copytree(undisturbed("shac")[1][0], tmp_path / "run")
+    (tmp_path / "run" / "progress.csv").unlink()
+    with pytest.raises(ValueError, match=r"progress\.csv has 0 rows, and had \d+"):
+        train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
+
+
 class Counting(LearnerSettings):
     """A learner of a user's own, which goes on as docs/resuming.md says; it learns nothing."""
 

@@ -319,6 +319,17 @@ def test_a_run_in_use_is_neither_joined_nor_overwritten_nor_resumed(tmp_path, mo
     assert content(folder) == [MARK]
 
 
+def test_going_on_and_overwriting_are_not_asked_for_together(tmp_path):
+    run_with_results(tmp_path / "run", "old")
+    before = content(tmp_path / "run")
+    with (
+        pytest.raises(ValueError, match="give one of the two"),
+        begun(tmp_path / "run", True, "best/*", ours=OURS, resume=True),
+    ):
+        raise AssertionError("it begins")
+    assert content(tmp_path / "run") == before
+
+
 def test_a_resumed_run_finds_what_is_there_and_leaves_it(tmp_path):
     folder = tmp_path / "run"
     with pytest.raises(ValueError, match="no such robot"), begun(folder, False, "best/*", ours=OURS, resume=True):

@@ -25,9 +25,12 @@ class ProgressTable(KVWriter):
 
     def __init__(self, path: Path, columns: Sequence[str] = (), rows: int = 0) -> None:
         self._path, self.columns, self.rows = path, list(columns), rows
-        kept = self._read()[1 : rows + 1] if columns else []
+        kept = self._read()[1 : rows + 1] if columns and path.exists() else []
         if len(kept) < rows:
-            raise ValueError(f"{path} has {len(kept)} rows, and had {rows} when the training's state was saved")
+            raise ValueError(
+                f"{path} has {len(kept)} rows, and had {rows} when the training's state was saved: put it back, or "
+                f"delete {path.parent / 'state'} to begin anew"
+            )
         self._begin([row[: len(columns)] for row in kept])
 
     def write(self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0) -> None:

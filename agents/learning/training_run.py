@@ -1,5 +1,6 @@
 """A training run, for any learner: validates policies and keeps them in a folder."""
 
+import hashlib
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,6 +20,7 @@ from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bu
 from caster_gym.agents.learning.progress import Events, ProgressTable, plain
 from caster_gym.agents.learning.saved_state import Snapshot, load_state, save_state
 from caster_gym.agents.learning.settings import GradientLearner, LearnerSettings, scheduled
+from caster_gym.configuration import ConfigurationError
 from caster_gym.durable_files import remove_leftovers, replace_folder, scratch_folder
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.report.provenance import versions
@@ -66,6 +68,8 @@ class Run:
         state = load_state(self._state_file) if resume else None
         self.saved = None if state is None else Snapshot(state.arrays, state.numbers["learner"])
         kept = {} if state is None else state.numbers["run"]
+        if kept and kept["training"] != self._training:
+            raise ConfigurationError(f"{self._state_file} is the state of another training: delete it to begin anew")
         self._started = time.perf_counter() - kept.get("seconds", 0.0)
         self._saved_at = time.perf_counter()
         if kept:
@@ -76,6 +80,12 @@ class Run:
         self._bring_back()
         self._table = ProgressTable(folder / "progress.csv", kept.get("columns", ()), kept.get("rows", 0))
         self.logger = Logger(str(folder), [self._table, Events(folder, self.steps if kept else None)])
+
+    @property
+    def _training(self) -> str:
+        """What tells this training from others."""
+        content = (self.task.model_dump_json(), self.settings.model_dump_json(exclude={"save_every"}), self.seed)
+        return hashlib.sha256(repr(content).encode()).hexdigest()
 
     @property
     def state_folder(self) -> Path:
@@ -96,6 +106,7 @@ class Run:
             return False
         learner = Snapshot(*take())
         numbers = {
+            "training": self._training,
             "steps": steps,
             "due": self._due,
             "seconds": now - self._started - self._validating,

@@ -130,6 +130,8 @@ def begun(
     that the work reads, which must not lie in the folder. ours: patterns of all files that the work writes, see
     `check_free`. resume: go on in a folder of ours with what is in it.
     """
+    if resume and overwrite:
+        raise ValueError("--resume goes on with what is in the folder, and --overwrite deletes it: give one of the two")
     real = Path(os.path.realpath(folder))
     goes_on = resume and (real / MARK).is_file() and any(_content(real))
     if not goes_on:
