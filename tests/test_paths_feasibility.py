@@ -263,14 +263,14 @@ def test_friction_beyond_the_motors_cannot_be_helped_by_going_slower():
 
 @pytest.mark.slow
 def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they_take():
-    """A hundred times the duration would suffice, and nothing at all for what lies beyond a million time steps."""
+    """A hundred times the duration would suffice, and nothing at all for what lies beyond the time steps that a path may have."""
     path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
     with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories(path, ROBOT, 0.1)
     duration = float(re.findall(r"a duration of at least ([\d.]+) s would suffice", str(error.value))[0])
     assert build_trajectories({**path, "duration": duration}, ROBOT, 0.1)
     with pytest.raises(ValueError, match="takes more time steps than a path may have"):
-        build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 6e4}, ROBOT, 0.1)
+        build_trajectories({**path, "waypoints": [(0, 0), (1e7, 0)], "duration": 3e4}, ROBOT, 0.1)
 
 
 @pytest.mark.parametrize("path", [{"shape": "circle"}, {"shape": "spline", "waypoints": [[0, 0, 0], [2, 1, 1]]}])
@@ -288,7 +288,7 @@ def test_a_path_that_would_take_too_many_time_steps_is_told_how_much_slower_it_m
     with pytest.raises(ValueError, match=r"must be driven \S+ times as slowly, .* more time steps than") as error:
         build_trajectories(far, ROBOT, 0.02)
     slower = float(re.findall(r"driven (\S+) times", str(error.value))[0])
-    assert build_trajectories({**far, "duration": 1000.0 * slower}, ROBOT, 0.05)
+    assert build_trajectories({**far, "duration": 1000.0 * slower}, ROBOT, 0.15)
 
 
 def test_a_feasible_path_passes_in_silence():
