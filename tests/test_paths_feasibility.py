@@ -263,7 +263,7 @@ def test_friction_beyond_the_motors_cannot_be_helped_by_going_slower():
 
 @pytest.mark.slow
 def test_waypoints_in_millimetres_that_are_read_as_metres_are_told_how_long_they_take():
-    """A hundred times the duration would suffice, and nothing at all for what lies beyond the time steps that a path may have."""
+    """A hundred times the duration would suffice, and nothing at all beyond the time steps that a path may have."""
     path = {"shape": "spline", "waypoints": [(0, 0), (500, 0), (1000, 0)]}
     with pytest.raises(ValueError, match="would suffice") as error:
         build_trajectories(path, ROBOT, 0.1)
