@@ -64,7 +64,7 @@ def load_state(path: Path) -> Snapshot | None:
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = file.metadata() or {}
-            arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
+            arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118  # cannot be iterated
             for name, order in json.loads(metadata[AXES]).items():
                 arrays[name] = arrays[name].transpose(np.argsort(order))
             return Snapshot(arrays, json.loads(metadata[NUMBERS]))
@@ -124,4 +124,4 @@ def restore_generators(state: Snapshot, device: torch.device | str = "cpu") -> N
     random.setstate((version, tuple(words), last))
     inner = generators["numpy"]["state"]
     key = np.array(inner["key"], dtype=np.uint32)
-    np.random.set_state({**generators["numpy"], "state": {"key": key, "pos": inner["pos"]}})  # noqa: NPY002
+    np.random.set_state({**generators["numpy"], "state": {"key": key, "pos": inner["pos"]}})  # noqa: NPY002  # the same
