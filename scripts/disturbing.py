@@ -170,12 +170,21 @@ def fail_a_write(work: Work, folder: Path, library: Path, number: int, error: in
             "PLUG_REPORT": str(report),
         },
     )
-    code = process.wait(STUCK)
+    code = outcome(work, process)
     await_end(process.pid)
     if report.exists():
         return Disturbance(work.name, errno.errorcode[error], 0.0)
     check(work, code, folder)
     return None
+
+
+def outcome(work: Work, process: "subprocess.Popen[bytes]") -> int:
+    """The exit code of a process. Raises RuntimeError for one that hangs, and ends it."""
+    try:
+        return process.wait(STUCK)
+    except subprocess.TimeoutExpired as error:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise RuntimeError(f"{work.name} hangs: it has not ended within {STUCK:g} s") from error
 
 
 def check(work: Work, code: int, folder: Path) -> None:

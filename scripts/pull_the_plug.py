@@ -73,7 +73,11 @@ def pull(kills: int, seed: int, names: Sequence[str] | None = None) -> Tally:
             generator, turn = random.Random(f"{seed} {number}"), number
             while tally.kills < kills and not tally.stopped:
                 work = works[turn % len(works)]
-                met = disturb(work, folders[number], library, generator)
+                try:
+                    met = disturb(work, folders[number], library, generator)
+                except RuntimeError:
+                    tally.stopped = True
+                    raise
                 tally.add(met, [f"{work.name}: {name}" for name in differing(work, folders[number])])
                 shutil.rmtree(folders[number] / "run")
                 turn += 1

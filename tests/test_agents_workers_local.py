@@ -142,6 +142,40 @@ def test_running_calls_are_interrupted_once_and_keep_what_they_have(tmp_path):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a began", "a kept", "b began", "b kept"]
 
 
+def end_otherwise(how, report):
+    """Makes something else of an interrupt, as where nothing can be saved any more."""
+    report("begun")
+    try:
+        while True:
+            signal.pause()
+    except KeyboardInterrupt:
+        if how == "error":
+            raise OSError("no space left") from None
+        return how
+
+
+STUBBORN = """
+import sys
+from tests.test_agents_workers_local import Call, LocalWorkers, end_otherwise
+if __name__ == "__main__":
+    with LocalWorkers(1) as workers:
+        workers.submit(Call("a", end_otherwise, (sys.argv[1],)))
+        for event in workers.events():
+            raise ValueError("enough")
+"""
+
+
+@pytest.mark.parametrize("how", ["error", "result"])
+def test_calls_that_make_something_else_of_an_interrupt_end_too(tmp_path, how):
+    script = tmp_path / "stubborn.py"
+    script.write_text(STUBBORN, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    ended = subprocess.run(
+        [sys.executable, script, how], env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert ended.stderr.splitlines()[-1] == "ValueError: enough"
+
+
 PARENT = """
 import sys
 from pathlib import Path

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import signal
+import threading
 from collections import Counter, deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -128,10 +129,18 @@ def _without_interrupts() -> Iterator[None]:
 def _work(connection: "Connection[Message, Any]") -> None:
     """What a worker process does until its parent has no more calls, interrupts it, or is gone."""
     end_with_parent()
+    interrupted = threading.Event()
+
+    def interrupt(number: int, frame: object) -> None:
+        """What Ctrl-C would do, once."""
+        interrupted.set()
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, interrupt)
     with suppress(EOFError, OSError, KeyboardInterrupt):
-        while True:
+        while not interrupted.is_set():  # a call may make something else of the interrupt, such as a full disk's error
             function, arguments = connection.recv()
             try:
                 answer: Message = (
@@ -141,9 +150,3 @@ def _work(connection: "Connection[Message, Any]") -> None:
             except Exception as error:
                 answer = "failed", portable(error)
             connection.send(answer)
-
-
-def _interrupt(number: int, frame: object) -> None:
-    """What Ctrl-C would do, once."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise KeyboardInterrupt
