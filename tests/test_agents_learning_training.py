@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -287,18 +287,20 @@ def test_training_processes_end_with_their_command(tmp_path, number):
     with subprocess.Popen(command, start_new_session=True, env=paths, stderr=subprocess.PIPE, text=True) as process:
         try:
             least = 0 if number == signal.SIGKILL else 1
-            wait_until(lambda: any(one.stat().st_size >= least for one in tmp_path.glob("runs/*/progress.csv")))
+            tables = partial(tmp_path.glob, "runs/*/progress.csv")
+            wait_until(lambda: any(one.stat().st_size >= least for one in tables()))
+            learned = [one.parent for one in tables() if one.stat().st_size > 0]
             process.send_signal(number)
             _, errors = process.communicate(timeout=LONGEST)
             wait_until(lambda: session_of(process) == [])
         finally:
             for one in session_of(process):
                 os.kill(one, signal.SIGKILL)
-    begun = list(tmp_path.glob("runs/*/progress.csv"))
-    assert len(begun) <= usable_cores()  # those that waited have not been begun
+    assert len(list(tables())) <= usable_cores()  # those that waited have not been begun
     if number == signal.SIGTERM:
         assert (process.returncode, errors.splitlines()[-1]) == (
             143,
             "caster-gym: interrupted; what was finished is kept",
         )
-        assert any(load_policy(file.parent / "best").description.trained_with["steps"] > 0 for file in begun)
+        assert learned
+        assert all(load_policy(folder / "best").description.trained_with["steps"] > 0 for folder in learned)

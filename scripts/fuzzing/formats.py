@@ -15,6 +15,7 @@ from caster_gym.agents.comparison.validation import read_history
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import DESCRIPTION, WEIGHTS, Bundle, PolicyDescription, load_policy, save_bundle
 from caster_gym.agents.registry import read_agent
+from caster_gym.agents.sweep.settings import SweepSettings, read_sweep
 from caster_gym.arena.arena import read_arena
 from caster_gym.design import read_design
 from caster_gym.envs.observation import ObservationLayout
@@ -86,6 +87,7 @@ def formats(folder: Path) -> dict[str, Format]:
             lambda path: read_settings(BenchmarkSettings, "benchmarks", path),
             3.0,
         ),
+        "sweep": Format("mutant.yaml", _shipped("sweeps"), mutate_yaml, _sweep, 2.0),
         "design": Format("mutant.yaml", _shipped("designs"), mutate_yaml, read_design, 0.5),
         "policy": Format(
             "mutant.yaml", [(policy / DESCRIPTION).read_bytes()], mutate_yaml, with_mutated(DESCRIPTION), 2.0
@@ -118,6 +120,14 @@ def _trajectories(path: Path) -> object:
     try:
         firsts = [one.model_copy(update={"count": 1}) if isinstance(one, RandomPaths) else one for one in paths]
         return [one.trajectories(STEP) for one in firsts]
+    except ValueError as error:  # which knows no file
+        raise ValueError(f"{path}: {error}") from error
+
+
+def _sweep(path: Path) -> object:
+    settings = read_settings(SweepSettings, "sweeps", path)
+    try:
+        return read_sweep(settings)
     except ValueError as error:  # which knows no file
         raise ValueError(f"{path}: {error}") from error
 
