@@ -5,7 +5,7 @@ from numpy.testing import assert_array_equal
 from scipy import stats
 
 from caster_gym.envs.randomness import uniform, uniforms
-from caster_gym.wrappers.draws import normals, seeds_of, stream
+from caster_gym.wrappers.draws import normals, seeds_of, stream, streams
 
 KEYS = np.array([0, 1, 2**63, 2**64 - 1], dtype=np.uint64)
 EPISODES = np.array([0, 5, 2**40, 1], dtype=np.uint64)
@@ -49,8 +49,17 @@ def test_the_most_extreme_bits_give_finite_numbers(monkeypatch):
 
 
 def test_features_share_no_numbers():
-    """Streams differ by place and by kind, and their numbers are independent."""
-    streams = [stream(place, kind) for place in range(4) for kind in ("payload", "friction", "pushes")]
-    assert len(set(streams)) == len(streams)
-    first, second = (uniforms(seeds(DRAWS, of), np.zeros(1, np.int64))[:, 0] for of in streams[:2])
+    """Streams differ by kind and among features of a kind, and their numbers are independent."""
+    several = streams(["payload", "friction", "pushes"] * 4)
+    assert len(set(several)) == len(several)
+    first, second = (uniforms(seeds(DRAWS, of), np.zeros(1, np.int64))[:, 0] for of in several[:2])
     assert abs(np.corrcoef(first, second)[0, 1]) < 5.0 / np.sqrt(DRAWS)  # five standard deviations
+
+
+def test_features_of_other_kinds_change_no_stream():
+    assert streams(["payload", "friction", "payload"]) == [
+        stream(0, "payload"),
+        stream(0, "friction"),
+        stream(1, "payload"),
+    ]
+    assert sorted(streams(["friction", "payload", "pushes", "payload"])[1::2]) == sorted(streams(["payload"] * 2))

@@ -139,8 +139,8 @@ def benchmark(
 
         settings = read_settings(BenchmarkSettings, "benchmarks", config)
         comparison = read_comparison(settings, changes_of(change))
-        named = files_among(config, settings.task, comparison.task.robot, *settings.agents)
-        at_work = open_workers(workers, threads, len(comparison.agents) * len(settings.seeds))
+        named = files_among(config, settings.task, comparison.task.robot, *(one.agent for one in settings.entrants))
+        at_work = open_workers(workers, threads, comparison.jobs)
         with begun(out, overwrite, WORTH_KEEPING, named, FILES, resume):
             text = run_benchmark(comparison, out, threads, resume, at_work)
         typer.echo(text)

@@ -10,7 +10,7 @@ from caster_gym.arrays import Array, Flags, Indices, Seeds
 from caster_gym.configuration import ConfigurationError, did_you_mean
 from caster_gym.mechanics.parameters import pack_parameters, robot_parameters
 from caster_gym.states import AnyState, State, check_state, join_states, part_of, without
-from caster_gym.wrappers.draws import seeds_of, stream
+from caster_gym.wrappers.draws import seeds_of, streams
 from caster_gym.wrappers.feature import (
     Actions,
     Feature,
@@ -50,7 +50,7 @@ class Stack:
         # an array for each feature: a pickled or copied stack still shares them, as it would not share views of one
         self._seeds = [np.zeros(engine.count, dtype=np.uint64) for _ in features]
         self._coming = np.zeros((len(features), engine.count), dtype=np.uint64)  # of episodes that were started
-        self._streams = [stream(place, getattr(feature, "kind", "")) for place, feature in enumerate(features)]
+        self._streams = streams([getattr(feature, "kind", type(feature).__name__) for feature in features])
         self._runtimes = [self._started(i, feature) for i, feature in enumerate(features)]
         self._names = [f"{i}_{getattr(one, 'kind', type(one).__name__)}" for i, one in enumerate(features)]
         self._rewards = [one for one in self._runtimes if isinstance(one, RewardRuntime)]
