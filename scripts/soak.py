@@ -25,7 +25,7 @@ from tqdm import tqdm
 from caster_gym.durable_files import write_file
 from caster_gym.report.tables import write_csv
 from scripts.soak_laws import DEEPEST, EXPLAINED, Energy, Inside, not_finite
-from scripts.soak_page import page
+from scripts.soak_page import faults_of, page
 from scripts.soak_scenes import Leg, draw_leg, make_batch
 
 ROBOTS = 2048  # in a batch
@@ -61,7 +61,10 @@ def run_leg(leg: Leg, seed: int, robots: int, periods: int, process: int) -> Row
     rng, count = np.random.default_rng((seed, leg.number, 1)), batch.num_envs
     observations, infos = batch.reset(seed=leg.number)
     base: Any = batch.unwrapped
-    energy, inside = Energy(base.engine, base.task.time_step), Inside(leg, base.engine)
+    energy, inside = (
+        Energy(base.engine, base.task.time_step, leg.settings["arena"]["friction"]),
+        Inside(leg, base.engine),
+    )
     faults = [f"{name} is not finite at the start" for name in not_finite("observations", observations)]
     actions = np.zeros(batch.action_space.sample().shape, dtype=np.float32)
     fresh, everybody = np.zeros(count, dtype=np.bool_), np.ones(count, dtype=np.bool_)
@@ -80,7 +83,7 @@ def run_leg(leg: Leg, seed: int, robots: int, periods: int, process: int) -> Row
         restarted = {AutoresetMode.NEXT_STEP: fresh, AutoresetMode.SAME_STEP: ended}.get(leg.mode, ~everybody)
         if restarted.any():
             energy.read_parameters()
-        excess = np.where(restarted, -1.0, energy.excess(infos["power"]))
+        excess = np.where(restarted, -1.0, energy.excess(infos["power"], infos["normal_impulse"]))
         gaps = np.minimum(infos["clearance"], inside.least_gaps(infos["pose"]))
         episodes, impacts = episodes + int(ended.sum()), impacts + int(infos["impacts"].sum())
         touched += int((infos["normal_impulse"] > 0.0).sum())
@@ -158,7 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             progress.write(f"interrupted: {len(rows)} legs are kept; --resume goes on")
     if rows:
         write_file(asked.out, page(rows))
-    return int(any(row.faults for row in rows))
+    return int(bool(faults_of(rows)))
 
 
 if __name__ == "__main__":

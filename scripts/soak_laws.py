@@ -8,6 +8,7 @@ import numpy as np
 from caster_gym.arena.arena import read_arena
 from caster_gym.arrays import Array, Flags
 from caster_gym.envs.native.engine import TaskEngine
+from caster_gym.mechanics.contact_impulses import SETTLED
 from caster_gym.mechanics.dynamics import kinetic_energy
 from caster_gym.mechanics.free_casters import slip_energy
 from caster_gym.mechanics.grip_or_slip import own_joint_rates
@@ -65,12 +66,15 @@ class Energy:
     Floor, friction and impacts only take energy, so that K₁ − K₀ ≤ A + W in each control period, with A the work of the
     motors and W that of a push. The environment tells A by the trapezoidal rule, time step h by time step: where a
     motor's speed changes steadily by Δ while its torque τ is held, that misses ½ τ |Δ| h at most. W is told here by the
-    same rule over the whole period T, which misses ½ |F| |Δv| T. These two are the slack. All that robots can ever have
-    is thus what motors and pushes gave them in their episode.
+    same rule over the whole period T, which misses ½ |F| |Δv| T. Impulses J of contacts are found to SETTLED, so that
+    they may work at speeds as small, by (1 + μ) J SETTLED in normal and tangential direction; of robots that are held
+    against a wall, that is all the energy there is. These three are the slack. All that robots can ever have is thus
+    what motors and pushes gave them in their episode.
     """
 
-    def __init__(self, engine: TaskEngine, time_step: float) -> None:
+    def __init__(self, engine: TaskEngine, time_step: float, friction: float) -> None:
         self.engine, self.time_step = engine, time_step
+        self.contact = (1.0 + friction) * SETTLED  # [m/s] at which a normal impulse may work
         self.look()
 
     def look(self) -> None:
@@ -83,10 +87,11 @@ class Energy:
         self.robot = unpack_parameters(tuple(self.engine.parameters.T.copy()))
         self.torques = np.array([(one.roll_max_torque, one.steer_max_torque) for one in self.robot.casters])
 
-    def excess(self, power: Array) -> Array:
+    def excess(self, power: Array, impulse: Array) -> Array:
         """How far each robot's energy rose beyond work and slack in the period that has passed, as a share of it. [-]
 
-        power: mean of the motors [W] (robots,). Below zero where the law holds.
+        power: mean of the motors [W] (robots,). impulse: of all contacts, normal to them [N s] (robots,). The share is
+        below zero where the law holds.
         """
         before, kinetic, speeds = self.state, self.kinetic, self.speeds
         after = self._state()
@@ -96,6 +101,7 @@ class Energy:
         work = period * (power + 0.5 * (wrench * (v0 + v1)).sum(axis=0))
         slack = 0.5 * self.time_step * (self.torques * abs(self.speeds - speeds)).sum(axis=(0, 1))
         slack = slack + 0.5 * period * (abs(wrench) * abs(v1 - v0)).sum(axis=0)
+        slack = slack + self.contact * impulse
         size = kinetic + self.kinetic + abs(work)
         share: Array = (self.kinetic - kinetic - work - slack) / np.maximum(size, STILL)
         return share

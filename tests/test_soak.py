@@ -5,6 +5,7 @@ import pytest
 
 from scripts import soak
 from scripts.soak_laws import not_finite
+from scripts.soak_page import GROWTH, faults_of
 from scripts.soak_scenes import KINDS, TASKS, draw_leg
 
 
@@ -41,3 +42,14 @@ def test_energy_from_nowhere_and_walls_that_are_passed_are_found(monkeypatch):
     monkeypatch.setattr(soak, "DEEPEST", -10.0)
     row = soak.run_leg(draw_leg(0, 0), 0, 8, 2, 1)
     assert "from nowhere" in row.faults and "inside an obstacle" in row.faults
+
+
+def test_memory_that_grows_after_the_first_round_is_found(tmp_path):
+    """What a round of kinds compiles is no growth, nor what the processes before this one held."""
+    row = soak.Row._make(kind() for kind in soak.Row.__annotations__.values())
+    first = [row._replace(process=1, memory=100.0 * (1 + number)) for number in range(KINDS)]
+    steady = [row._replace(process=1, memory=100.0 * KINDS * (1.0 + GROWTH))]
+    other = [row._replace(process=2, memory=900.0)]
+    assert faults_of(first + steady) == faults_of(first + steady + other) == []
+    grown = faults_of([*first, *steady, row._replace(process=1, memory=1300.0)])
+    assert grown == ["memory grew from 1200 to 1300 MB in 2 legs"]
