@@ -4,9 +4,12 @@ A name may lead to a pipe that nobody writes to, to an endless device or to more
 is opened to be read: what is wrong is told in a sentence that names the file.
 """
 
+import errno
 import os
 import stat
 from pathlib import Path
+
+from caster_gym.brief import brief
 
 # Greatest sizes [bytes]. All that is read is turned into objects within about a second and 200 MB.
 YAML_BYTES = 4 << 20  # four times what a task with a timed path of 15,000 poses takes
@@ -30,8 +33,6 @@ def read_bytes(path: str | Path, most: int, remedy: str = "") -> bytes:
     Raises ValueError that names the file and says what is wrong with it.
     """
     path = expanded(path)
-    if "\0" in str(path):
-        raise ValueError(f"{str(path)!r} is no name of a file: it holds a zero byte")
     try:
         _check(path, path.stat(), most, remedy)  # before it is opened, which may do something to a device
         handle = os.open(path, sum(_FLAGS))
@@ -47,11 +48,21 @@ def read_bytes(path: str | Path, most: int, remedy: str = "") -> bytes:
 
 
 def expanded(path: str | Path) -> Path:
-    """The path with the home of whoever it begins with, as in ~/runs. Raises ValueError for an unknown user."""
+    """The path with the home of whoever it begins with, as in ~/runs; there may be nothing at it.
+
+    Raises ValueError for an unknown user, and for what cannot be the name of a file.
+    """
+    if "\0" in str(path):
+        raise ValueError(f"{brief(str(path))} is no name of a file: it holds a zero byte")
     try:
-        return Path(path).expanduser()
+        found = Path(path).expanduser()
+        found.lstat()
     except RuntimeError:
-        raise ValueError(f"{str(path)!r} begins with the home of a user that is not known here") from None
+        raise ValueError(f"{brief(str(path))} begins with the home of a user that is not known here") from None
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise ValueError(f"{brief(str(path))} is no name of a file: it is too long") from None
+    return found
 
 
 def _check(path: Path, found: os.stat_result, most: int, remedy: str) -> None:

@@ -1,5 +1,6 @@
 """Files that come with the package, by kind and name: tasks, agents, designs, benchmarks."""
 
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
@@ -7,6 +8,7 @@ from typing import TypeVar
 from pydantic import BaseModel
 
 from caster_gym.bounded_files import expanded
+from caster_gym.brief import brief
 from caster_gym.configuration import ConfigurationError, is_yaml, parse, read_yaml
 
 Settings = TypeVar("Settings", bound=BaseModel)
@@ -35,14 +37,16 @@ def find(kind: str, name: str | Path) -> Path:
         own = own_file(name)
         known = f"known are {', '.join(names_of(kind))}, or give the path of a YAML file"
         raise ConfigurationError(
-            f"there is no {name!r} in {kind}; {f'did you mean the file {own!r}?' if own else known}"
+            f"there is no {brief(name)} in {kind}; {f'did you mean the file {own!r}?' if own else known}"
         )
     return _folder_of(kind) / f"{name}.yaml"
 
 
 def own_file(name: str) -> str | None:
     """The YAML file that was perhaps meant by a name without its suffix, if there is one."""
-    return next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if Path(f"{name}{suffix}").is_file()), None)
+    with suppress(ValueError):  # it cannot be the name of a file
+        return next((f"{name}{suffix}" for suffix in (".yaml", ".yml") if expanded(f"{name}{suffix}").is_file()), None)
+    return None
 
 
 def read_settings(model: type[Settings], kind: str, name: str | Path) -> Settings:

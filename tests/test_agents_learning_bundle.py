@@ -322,3 +322,8 @@ def test_a_policy_with_features_is_read_back(tmp_path):
     assert after.description == before.description
     assert after.agent.act(observations(4)).shape == (4, 3)
     assert_array_equal(after.agent.act(observations()), before.agent.act(observations()))
+
+
+def test_a_name_that_no_folder_can_have_is_told():
+    with pytest.raises(ConfigurationError, match="is no name of a file: it is too long"):
+        load_policy("n" * 300)

@@ -13,7 +13,7 @@ from caster_gym.configuration import ConfigurationError, Frozen, parse
 from caster_gym.design.command import read_design
 from caster_gym.file_names import FileName, NameOrFile, from_working_folder, is_file_name
 from caster_gym.paths.splines import Spline
-from caster_gym.shipped_files import read_settings
+from caster_gym.shipped_files import find, read_settings
 
 CONFIGS = Path(str(files("caster_gym.configs")))
 PATHS = {kind: [{"shape": "random_paths", "seed": seed}] for seed, kind in enumerate(("train", "validation", "test"))}
@@ -106,3 +106,13 @@ def test_names_of_what_comes_with_the_package_stay(tmp_path):
 @pytest.mark.parametrize(("name", "answer"), [("a.yaml", True), ("b.CSV", True), ("chung2008", False), ("v2.5", False)])
 def test_files_have_a_suffix(name, answer):
     assert is_file_name(name) == answer
+
+
+@pytest.mark.parametrize("kind", ["tasks", "agents", "robots", "benchmarks", "designs", "sweeps"])
+def test_names_that_no_file_can_have_are_told(kind):
+    """With a suffix and without one; a name that only its suffix makes too long is an unknown one."""
+    with pytest.raises(ValueError, match="is no name of a file: it is too long"):
+        find(kind, f"{'n' * 300}.yaml")
+    for length in (253, 300):
+        with pytest.raises(ConfigurationError, match=f"there is no 'n{{30,60}}.*' in {kind}; known are"):
+            find(kind, "n" * length)

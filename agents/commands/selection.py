@@ -9,6 +9,7 @@ from caster_gym.agents.comparison.validation import tune
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
 from caster_gym.agents.registry import is_python, read_agent
+from caster_gym.bounded_files import expanded
 from caster_gym.configuration import is_yaml, parse, read_yaml
 from caster_gym.own_code import RESULTS
 from caster_gym.shipped_files import names_of, own_file, read_settings
@@ -37,7 +38,7 @@ def choose_agent(name: str, settings: TaskSettings, batch: Batch) -> ChosenAgent
 
     Raises ValueError for a policy that does not fit the batch, and for an agent that must be trained first.
     """
-    folder = Path(name).expanduser()
+    folder = expanded(name)
     named = name in names_of("agents") or is_python(name) or (is_yaml(name) and folder.name not in RESULTS)
     known = read_agent(name) if named else None
     if isinstance(known, ControllerSettings) and not (folder / DESCRIPTION).is_file():
@@ -73,7 +74,7 @@ def choose_task(agent: str, task: str | None) -> ChosenTask:
         other = _named(trained) or f"that of {run}"
         same, differs = ", on which the policy was trained.", f"; the policy was trained on another one, {other}."
         return ChosenTask(settings, f"Task {name}{same if trained == settings else differs}")
-    if task is None and (Path(agent).expanduser() / DESCRIPTION).is_file():
+    if task is None and (expanded(agent) / DESCRIPTION).is_file():
         words = f"Task {name}, since no {RUN} above {agent} tells on which it was trained; see --task."
         return ChosenTask(settings, words)
     return ChosenTask(settings, f"Task {name}.")
@@ -81,7 +82,7 @@ def choose_task(agent: str, task: str | None) -> ChosenTask:
 
 def _run_of(agent: str) -> Path | None:
     """The run.yaml of the training run of a policy, if it is where training puts it."""
-    folder = Path(agent).expanduser()
+    folder = expanded(agent)
     if not (folder / DESCRIPTION).is_file():
         return None
     above = folder.absolute().parents[:2]  # of best/, and of what stands in checkpoints/

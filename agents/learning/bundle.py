@@ -19,6 +19,7 @@ from caster_gym.agents.comparison.task_settings import ChosenTask, in_brief
 from caster_gym.agents.learning.actor import Actor, LearnedAgent, Squash
 from caster_gym.agents.learning.settings import MOST_LAYERS
 from caster_gym.agents.learning.weights import actor_shapes, read_weights
+from caster_gym.bounded_files import expanded
 from caster_gym.brief import brief
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
 from caster_gym.durable_files import replace_folder, scratch_folder, write_file
@@ -157,7 +158,7 @@ def load_policy(folder: str | Path) -> Bundle:
     >>> policy.act(observations).shape, policy.predict(observations[0])[0].shape
     ((16, 6), (6,))
     """
-    folder = Path(folder)
+    folder = _folder_named(folder)
     if not (folder / DESCRIPTION).is_file():
         raise ConfigurationError(_no_policy(folder))
     content = read_yaml(folder / DESCRIPTION)
@@ -175,6 +176,14 @@ def load_policy(folder: str | Path) -> Bundle:
         actor = Actor(*sizes, description.squash)
     actor.load_state_dict(weights, assign=True)
     return Bundle(description, actor)
+
+
+def _folder_named(name: str | Path) -> Path:
+    try:
+        expanded(Path(name) / DESCRIPTION)  # it may be too long to be a name
+        return expanded(name)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
 
 
 def _no_policy(folder: Path) -> str:
