@@ -33,11 +33,14 @@ def settings(kind, rng):
     low, high = np.sort(rng.uniform(0.0, 1.0, 2))
     fields: dict[str, Any] = {
         "action_delay": {"periods": [0, int(rng.integers(1, 5))]},
+        "dropped_packets": {"probability": high},
         "effort": {"weight": high},
         "friction": {"added_viscous": [1e-3 * low, 1e-3 * high], "floor_friction": [0.3, 0.9]},
         "impact": {"weight": high},
         "joint_speeds": {"bandwidth": 50.0 * high},
+        "motor_failure": {"after": [0.0, 0.4 * high]},
         "motor_lag": {"time_constant": [0.1 * low, 0.1 * high]},
+        "odometry": {},
         "payload": {"mass": [2.0 * low, 2.0 * high], "x": [-0.05, 0.05]},
         "potential": {"quantity": "position_error", "margin": 0.5, "discount": high},
         "pushes": {"rate": 10.0 * high, "force": [5.0 * low, 5.0 * high], "duration": 0.2},

@@ -9,8 +9,11 @@
 
 from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistCommands
 from caster_gym.wrappers.environment import FeatureEnv, FeatureVectorEnv, wrap
+from caster_gym.wrappers.failures import MotorFailure
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.latency import ActionDelay, MotorLag
+from caster_gym.wrappers.odometry import Odometry
+from caster_gym.wrappers.packets import DroppedPackets
 from caster_gym.wrappers.plants import Friction, Payload, WheelErrors
 from caster_gym.wrappers.pushes import Pushes
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
@@ -19,6 +22,7 @@ from caster_gym.wrappers.specification import FeatureSpecification, read_feature
 
 __all__ = [
     "ActionDelay",
+    "DroppedPackets",
     "Effort",
     "Feature",
     "FeatureEnv",
@@ -27,7 +31,9 @@ __all__ = [
     "Friction",
     "Impact",
     "JointSpeeds",
+    "MotorFailure",
     "MotorLag",
+    "Odometry",
     "Payload",
     "Potential",
     "Pushes",

@@ -97,6 +97,9 @@ class Runtime:
     def begin(self, robots: Indices, quantities: Quantities) -> None:
         """New episodes of some robots have begun; quantities are those after their reset."""
 
+    def look(self, quantities: Quantities) -> None:
+        """A control period is over; quantities are those at its end. What is observed then follows."""
+
     def act(self, actions: Actions) -> Actions:
         """Actions for the inside from those of the outside."""
         return actions

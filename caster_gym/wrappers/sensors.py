@@ -1,9 +1,7 @@
 """Sensors with noise, bias and misaligned encoders.
 
 Noise enters where a robot measures, in its pose, twist, steering angles and joint rates, and all parts of an
-observation that are computed from a measurement follow it: a heading that is wrong by ε turns everything that is seen
-of the reference by −ε, and an error of the twist shows in the twist and, the other way round, in its error. Parts that
-are measured from the robot itself, such as obstacles, stay as they are.
+observation that are computed from a measurement follow it (`misjudging`).
 """
 
 from typing import Literal
@@ -16,6 +14,7 @@ from caster_gym.envs.observation import OBSERVATION_LIMIT
 from caster_gym.envs.randomness import uniforms
 from caster_gym.wrappers.draws import normals
 from caster_gym.wrappers.feature import Feature, Observations, Place, Quantities, Range, Robots, Runtime, between
+from caster_gym.wrappers.misjudging import Misjudged, turn
 
 
 class SensorNoise(Feature):
@@ -83,7 +82,7 @@ class _SteeringOffset(Runtime):
 
     def observe(self, observations: Observations, robots: Robots) -> Observations:
         shown = observations.copy()
-        _turn(shown, self._directions.start + 2 * self._casters, self._cos[robots], self._sin[robots])
+        turn(shown, self._directions.start + 2 * self._casters, self._cos[robots], self._sin[robots])
         return shown
 
 
@@ -103,12 +102,8 @@ class _SensorNoise(Runtime):
         self._wrong = frozenset(int(i) for i in (*self._noisy, *self._biased))
         self._constant = np.zeros((place.count, len(self._noise)))
         self._directions = place.part("directions").place.start + 2 * np.arange(casters)
-        self._scales = {part.name: part.scale for part in layout.parts}
-        previews = [part.name for part in layout.parts if part.name.startswith("preview_")]
-        self._points = ["position_error", *previews]
-        starts = {part.name: part.place.start for part in layout.parts}
-        pairs = [starts["position_error"], starts["heading_error"], starts["reference_acceleration"]]
-        self._pairs = np.array(pairs + [starts[name] + first for name in previews for first in (0, 2, 4)])
+        self._rates = place.part("joint_rates")
+        self._misjudge = Misjudged(layout).misjudge
 
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
         drawn = normals(self._place.seeds[robots], self._biased)
@@ -120,13 +115,13 @@ class _SensorNoise(Runtime):
         errors = self._errors(robots)
         shown = observations.astype(np.float64)
         if {0, 1, 2, 3, 4, 5} & self._wrong:
-            self._misjudge_pose_and_twist(shown, errors)
+            self._misjudge(shown, errors[:, :6], 2 in self._wrong)
         casters = len(self._directions)
         if 6 in self._wrong:
             angles = errors[:, 6 : 6 + casters]
-            _turn(shown, self._directions, np.cos(angles), np.sin(angles))
+            turn(shown, self._directions, np.cos(angles), np.sin(angles))
         if 6 + casters in self._wrong:
-            shown[:, self._place.part("joint_rates").place] += errors[:, 6 + casters :] / self._scales["joint_rates"]
+            shown[:, self._rates.place] += errors[:, 6 + casters :] / self._rates.scale
         return np.clip(shown, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
 
     def _errors(self, robots: Robots) -> Array:
@@ -137,24 +132,3 @@ class _SensorNoise(Runtime):
             indices = len(self._noise) * (clocks + 1) + self._noisy  # the first ones are those of the biases
             errors[:, self._noisy] += self._noise[self._noisy] * normals(self._place.seeds[robots], indices)
         return errors
-
-    def _misjudge_pose_and_twist(self, shown: Array, errors: Array) -> None:
-        """Put errors of place, heading and twist into all that follows from them."""
-        twist, error = self._place.part("twist").place, self._place.part("twist_error").place
-        ratio = self._scales["twist"] / self._scales["twist_error"]
-        reference = shown[:, error] + ratio * shown[:, twist]  # velocity of the reference, in units of the error
-        for name in self._points:
-            start = self._place.part(name).place.start
-            shown[:, start : start + 2] -= errors[:, :2] / self._scales[name][:2]
-        if 2 in self._wrong:
-            cos, sin = np.cos(errors[:, 2:3]), -np.sin(errors[:, 2:3])
-            _turn(shown, self._pairs, cos, sin)
-            _turn(reference, np.zeros(1, dtype=np.int64), cos, sin)
-        shown[:, twist] += errors[:, 3:6] / self._scales["twist"]
-        shown[:, error] = reference - ratio * shown[:, twist]
-
-
-def _turn(rows: np.ndarray, first: np.ndarray, cos: Array, sin: Array) -> None:
-    """Turn the pairs that begin in some columns, in place, counter-clockwise."""
-    x, y = rows[:, first], rows[:, first + 1]
-    rows[:, first], rows[:, first + 1] = cos * x - sin * y, sin * x + cos * y

@@ -8,8 +8,11 @@ from pydantic import Field
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.paths.naming import unknown_name
 from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistCommands
+from caster_gym.wrappers.failures import MotorFailure
 from caster_gym.wrappers.feature import Feature
 from caster_gym.wrappers.latency import ActionDelay, MotorLag
+from caster_gym.wrappers.odometry import Odometry
+from caster_gym.wrappers.packets import DroppedPackets
 from caster_gym.wrappers.plants import Friction, Payload, WheelErrors
 from caster_gym.wrappers.pushes import Pushes
 from caster_gym.wrappers.rewards import Effort, Impact, Potential, Smoothness, Tolerance, TractionUse
@@ -29,6 +32,9 @@ AnyFeature: TypeAlias = (
     | MotorLag
     | SensorNoise
     | SteeringOffset
+    | Odometry
+    | DroppedPackets
+    | MotorFailure
     | Payload
     | Friction
     | WheelErrors

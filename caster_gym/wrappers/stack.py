@@ -118,6 +118,8 @@ class Stack:
         """Terms (robots,) of a step by name. Robots in `ended` have their last quantities in `final`."""
         self._clocks += 1
         quantities = _quantities(infos, final, ended)
+        for runtime in self._runtimes:
+            runtime.look(quantities)
         return {reward.name: reward.term(quantities, terminated) for reward in self._rewards}
 
     def observe(self, observations: Observations, robots: Robots = EVERYONE) -> Observations:
