@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+import yaml
 from pydantic import TypeAdapter
 
 from caster_gym import load_robot
@@ -107,3 +108,11 @@ def test_errors_of_building_name_the_path():
 def test_importing_paths_leaves_scipy_alone():
     command = "import sys, caster_gym.paths; print('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", command], capture_output=True, text=True).stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(("name", "said"), [("n" * 300, "it is too long"), ("a\0b", "it holds a zero byte")])
+def test_a_file_that_names_what_cannot_be_a_file_is_named_too(tmp_path, name, said):
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump({"shape": "spline", "file": name}), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=rf"mine\.yaml: 'file': .* is no name of a file: {said}"):
+        read_paths(file)

@@ -79,7 +79,10 @@ def _named(path: str | Path) -> AnyPath:
     if is_yaml(file):
         content = read_yaml(file)
         if isinstance(content.get("file"), str):  # relative to the file in which it stands
-            content["file"] = str(file.parent / expanded(content["file"]))
+            try:
+                content["file"] = str(file.parent / expanded(content["file"]))
+            except ValueError as error:
+                raise ConfigurationError(f"{path}: 'file': {error}") from error
         return _read(content, f"{path}: path")
     if not (isinstance(path, Path) or file.suffix or len(file.parts) > 1):
         return _read({"shape": path}, "path")

@@ -79,8 +79,7 @@ class _Odometry(Runtime):
         jacobian = self._levers[:, None] * self._model.jacobian(np.arctan2(directions[..., 1], directions[..., 0]))
         speeds = self._levers * self._seen(observations, "joint_rates")
         both = np.swapaxes(jacobian, -1, -2)
-        twist = np.asarray(np.linalg.solve(both @ jacobian, both @ speeds[..., None])[..., 0], dtype=np.float64)
-        return twist
+        return np.asarray(np.linalg.solve(both @ jacobian, both @ speeds[..., None])[..., 0], dtype=np.float64)
 
     def _count(self, robots: Robots, twist: Array) -> None:
         """Count the control period that has passed, for those robots for which one has."""
