@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from caster_gym.arena.arena import Arena
     from caster_gym.arena.packing import surroundings
     from caster_gym.configuration import ConfigurationError
+    from caster_gym.engines.native.derivatives import PeriodDerivatives
     from caster_gym.engines.native.fleet import Fleet
     from caster_gym.engines.numpy_model import Model
     from caster_gym.engines.tensor.fleet import TorchFleet
@@ -47,6 +48,7 @@ __all__ = [
     "Floor",
     "Model",
     "ObservationLayout",
+    "PeriodDerivatives",
     "Robot",
     "SB3VecEnv",
     "TorchFleet",
@@ -79,6 +81,7 @@ _HOMES = {
     "Floor": "caster_gym.floor",
     "Model": "caster_gym.engines.numpy_model",
     "ObservationLayout": "caster_gym.envs.observation",
+    "PeriodDerivatives": "caster_gym.engines.native.derivatives",
     "Robot": "caster_gym.robot",
     "SB3VecEnv": "caster_gym.agents.learning.sb3_environment",
     "TorchFleet": "caster_gym.engines.tensor.fleet",

@@ -60,6 +60,8 @@ RATIOS = (
     Ratio("native batch over DummyVecEnv of the same, both in SB3: steps", "sb3_small", "dummy_ours"),
     Ratio("two cores over one, bare", "bare_cores", "bare"),
     Ratio("two cores over one, environment", "env_cores", "env"),
+    Ratio("derivatives over the step alone, one robot, a call each: time", "jacobian", "bare_call"),
+    Ratio("derivatives of one robot over those of a robot in a batch: time", "jacobian", "jacobian_batch"),
     Ratio("MuJoCo's `rollout` over `mj_step`", "mujoco_threads", "mujoco"),
     Ratio("bare among 8 obstacles over none", "bare_among", "bare", 1.0, at_least(0.5)),
     Ratio("following among 6 obstacles over none", "follow_among", "follow"),

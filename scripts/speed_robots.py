@@ -1,6 +1,6 @@
 """Measurements of our robots: the bare equations, whole environments in batches, and one robot alone."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -12,6 +12,7 @@ from caster_gym.agents.learning.sb3_environment import SB3VecEnv
 from caster_gym.arena import Arena, distances
 from caster_gym.arena.arena import Pillar
 from caster_gym.arena.packing import surroundings
+from caster_gym.engines.native.derivatives import PeriodDerivatives
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.engines.native.threads import set_threads
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
@@ -32,6 +33,7 @@ PERIOD = SUBSTEPS * RK4_STEP  # [s]
 EXCERPT = 400  # RK4 steps of a motion
 BANK = 64  # actions drawn beforehand
 BANKED = 2**18  # robots in them at most, so that the greatest batches do not fill the memory
+JACOBIANS = 1024  # robots of a batch
 SMALL_BATCH = 16  # as many environments as are usual for SB3
 HALF = 1.8  # [m] half of the square in which robots start
 ROOM = Arena(
@@ -69,6 +71,22 @@ def bare_equations(
         return count * steps * calls
 
     return Work(call, prepare)
+
+
+def derivatives(robot: Robot, count: int, parameters: Sequence[str] = ()) -> Work:
+    """One RK4 step of a batch at a call, with its derivatives by states, torques and parameters."""
+    of_a_step = PeriodDerivatives(robot, RK4_STEP, by=parameters)
+    rng = np.random.default_rng(0)
+    states = Fleet(robot, count).state
+    states[:, 4:7] = SPEED * rng.normal(size=(count, 3))
+    torques = ACTION * rng.uniform(-1.0, 1.0, (count, len(robot.joints))) * limits(robot)
+
+    def call() -> int:
+        for _ in range(BANK):
+            of_a_step.at(states, torques)
+        return count * BANK
+
+    return Work(call)
 
 
 def cycled(step: Callable[[Any], object], actions: Any, robots: int) -> Work:
@@ -194,6 +212,31 @@ def bare_rows(robot: Robot, cores: int, seconds: float) -> list[Row]:
             on(1, bare_equations(robot, 4096, ROOM), seconds),
         ),
         Row("bare_one", "bare RK4, one robot, 1 core", RATE, on(1, bare_equations(robot, 1), seconds)),
+        Row(
+            "bare_call",
+            "the same, one step at a call",
+            "µs",
+            each(bare_equations(robot, 1, steps=1, calls=BANK), seconds),
+        ),
+        Row(
+            "jacobian",
+            "an RK4 step and its derivatives by state and torques, one robot, 1 core",
+            "µs",
+            each(derivatives(robot, 1), seconds),
+            at_most(8.0),
+        ),
+        Row(
+            "jacobian_batch",
+            f"the same, a robot of a batch of {JACOBIANS:,}, 1 core",
+            "µs",
+            each(derivatives(robot, JACOBIANS), seconds),
+        ),
+        Row(
+            "jacobian_parameters",
+            "the same, also by five parameters",
+            "µs",
+            each(derivatives(robot, JACOBIANS, ("mass", "com_x", "com_y", "inertia", "radius")), seconds),
+        ),
     ]
 
 

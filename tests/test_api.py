@@ -29,6 +29,7 @@ NAMES = [
     "Floor",
     "Model",
     "ObservationLayout",
+    "PeriodDerivatives",
     "Robot",
     "SB3VecEnv",
     "TorchFleet",
