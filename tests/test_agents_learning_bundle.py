@@ -23,7 +23,7 @@ from caster_gym.robot import load_robot
 from caster_gym.tasks.follow.parameters import FollowParameters
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.tasks.track.parameters import TrackParameters
-from caster_gym.wrappers import MotorLag, TwistCommands
+from caster_gym.wrappers import History, MotorLag, TwistCommands
 from tests.kills import killed_at_each_line
 
 ROBOT = load_robot("chung2008")
@@ -327,3 +327,22 @@ def test_a_policy_with_features_is_read_back(tmp_path):
 def test_a_name_that_no_folder_can_have_is_told():
     with pytest.raises(ConfigurationError, match="is no name of a file: it is too long"):
         load_policy("n" * 300)
+
+
+def test_a_policy_that_sees_the_past_is_written_and_read_and_needs_it(tmp_path):
+    """Its weights are as wide as what it sees; without the feature, the sentence names what it has learned from."""
+    past = History(observations=1, actions=2)
+    plain = fresh_bundle()
+    size, actions = plain.description.layout.size, plain.agent.actor.head.out_features
+    wide = Actor(2 * size + 2 * actions, plain.description.hidden, actions, plain.description.squash)
+    bundle = Bundle(plain.description.model_copy(update={"wrappers": (past,)}), wide)
+    save_bundle(tmp_path / "policy", bundle)
+    again = load_policy(tmp_path / "policy")
+    observations = np.random.default_rng(0).normal(size=(3, 2 * size + 2 * actions)).astype(np.float32)
+    assert_array_equal(again.act(observations), bundle.act(observations))
+    fits = plain.description.layout, plain.description.task.control_period
+    again.check_fits(*fits, (past,))
+    with pytest.raises(ValueError, match=r"has learned from \{kind: history, actions: 2\}, the task shows the present"):
+        again.check_fits(*fits)
+    with pytest.raises(ValueError, match=r"from the present observation alone, the task shows \{kind: history"):
+        plain.check_fits(*fits, (past,))

@@ -70,6 +70,7 @@ STACKS = {
     "twists": (SensorNoise(position=0.01, speed=0.02), TwistCommands(), ActionDelay(periods=2)),
     "speeds": (JointSpeeds(), SensorNoise(position=0.01), Smoothness()),
     "residual": (ActionDelay(), SensorNoise(position=0.05), ResidualTorque(agent=Follower(), share=0.7), Smoothness()),
+    "history": (*TORQUES[:6], *read_features([{"kind": "history", "observations": 2}, "smoothness"])),
     "nothing": (),
 }
 

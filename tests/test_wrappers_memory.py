@@ -36,6 +36,7 @@ def settings(kind, rng):
         "dropped_packets": {"probability": high},
         "effort": {"weight": high},
         "friction": {"added_viscous": [1e-3 * low, 1e-3 * high], "floor_friction": [0.3, 0.9]},
+        "history": {"observations": int(rng.integers(0, 3)), "actions": int(rng.integers(0, 4))},
         "impact": {"weight": high},
         "joint_speeds": {"bandwidth": 50.0 * high},
         "motor_failure": {"after": [0.0, 0.4 * high]},
@@ -64,7 +65,9 @@ def features():
 
 KINDS = sorted(get_args(one.model_fields["kind"].annotation)[0] for one in features())
 ALONE = [(kind,) for kind in KINDS]
-TOGETHER = [tuple(kind for kind in KINDS if kind not in REDEFINING or kind == one) for one in REDEFINING]
+TOGETHER = [
+    (*(kind for kind in KINDS if kind not in (*REDEFINING, "history") or kind == one), "history") for one in REDEFINING
+]
 
 
 def made(kinds, mode=None, seed=0):

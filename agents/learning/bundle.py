@@ -55,6 +55,11 @@ class PolicyDescription(ChosenTask):
         """What the policy's observations mean."""
         return observation_layout(find_task(self.environment), self.robot, self.task)
 
+    def observed(self, actions: int) -> int:
+        """Numbers in an observation, where there are so many actions."""
+        size = self.layout.size
+        return size + sum(feature.added(size, actions) for feature in self.wrappers)
+
 
 class Bundle:
     """A learned policy together with its description; it acts as every `Agent` does, and as models of SB3 do."""
@@ -119,12 +124,23 @@ class Bundle:
         )
         if meant != understood:
             raise ValueError(f"the policy's actions are {_named(meant)}, the task takes {_named(understood)}")
+        learned_from, shown = (
+            [feature for feature in some if feature.added(1, 1)] for some in (self.description.wrappers, features)
+        )
+        if learned_from != shown:
+            raise ValueError(
+                f"the policy has learned from {_seen(learned_from)}, the task shows {_seen(shown)}: set its wrappers so"
+            )
 
 
 def _purpose(unit: str) -> str:
     """What the first task is for whose previews have that unit."""
     task = next(one for one in all_tasks() if one.preview_unit == unit)
     return f"{task.purpose} (environment {task.name!r})"
+
+
+def _seen(features: Sequence[Feature]) -> str:
+    return ", ".join(map(in_brief, features)) or "the present observation alone"
 
 
 def _named(features: Sequence[Feature]) -> str:
@@ -170,7 +186,7 @@ def load_policy(folder: str | Path) -> Bundle:
     refuse_imports(content.get("environment"), str(folder / DESCRIPTION))
     description = parse(PolicyDescription, content, str(folder / DESCRIPTION))
     actions = description.actions or len(description.robot.driven)
-    sizes = description.layout.size, description.hidden, actions
+    sizes = description.observed(actions), description.hidden, actions
     weights = read_weights(folder / WEIGHTS, actor_shapes(*sizes))
     with torch.device("meta"):  # nothing is allocated, and nothing drawn at random
         actor = Actor(*sizes, description.squash)

@@ -11,6 +11,7 @@ from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistComma
 from caster_gym.wrappers.environment import FeatureEnv, FeatureVectorEnv, wrap
 from caster_gym.wrappers.failures import MotorFailure
 from caster_gym.wrappers.feature import Feature
+from caster_gym.wrappers.history import History
 from caster_gym.wrappers.latency import ActionDelay, MotorLag
 from caster_gym.wrappers.odometry import Odometry
 from caster_gym.wrappers.packets import DroppedPackets
@@ -29,6 +30,7 @@ __all__ = [
     "FeatureSpecification",
     "FeatureVectorEnv",
     "Friction",
+    "History",
     "Impact",
     "JointSpeeds",
     "MotorFailure",

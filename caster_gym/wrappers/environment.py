@@ -52,8 +52,8 @@ class FeatureEnv(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         self.features = _checked([read_features([one])[0] if isinstance(one, Mapping) else one for one in features])
         RecordConstructorArgs.__init__(self, features=plain(self.features))
         gym.Wrapper.__init__(self, env)
-        self._stack = Stack(_engine(env), _task(env), self.features, _space(env.action_space))
-        self.action_space = self._stack.action_space
+        self._stack = Stack(_engine(env), _task(env), self.features, *_spaces(env.action_space, env.observation_space))
+        self.action_space, self.observation_space = self._stack.action_space, self._stack.observation_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -132,9 +132,12 @@ class FeatureVectorEnv(AnyVectorWrapper):
         super().__init__(env)
         self.features = _checked(features)
         self.autoreset_mode = AutoresetMode(env.metadata["autoreset_mode"])
-        self._stack = Stack(_engine(env), _task(env), self.features, _space(env.single_action_space))
-        self.single_action_space = self._stack.action_space
+        inside = _engine(env), _task(env)
+        spaces = _spaces(env.single_action_space, env.single_observation_space)
+        self._stack = stack = Stack(*inside, self.features, *spaces)
+        self.single_action_space, self.single_observation_space = stack.action_space, stack.observation_space
         self.action_space = batch_space(self.single_action_space, env.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, env.num_envs)
         self._ended: Flags = np.zeros(env.num_envs, dtype=np.bool_)
         self._shown: Observations = np.zeros(self.observation_space.shape or (), dtype=np.float32)
 
@@ -292,10 +295,12 @@ def _checked(features: Sequence[Feature]) -> tuple[Feature, ...]:
     return tuple(features)
 
 
-def _space(space: Any) -> "gym.spaces.Box[Any]":
-    if not isinstance(space, gym.spaces.Box):
-        raise ValueError(f"features need actions in a Box, got {space}")
-    return space
+def _spaces(*spaces: Any) -> "tuple[gym.spaces.Box[Any], gym.spaces.Box[Any]]":
+    actions, observations = spaces
+    for what, space in (("actions", actions), ("observations", observations)):
+        if not isinstance(space, gym.spaces.Box):
+            raise ValueError(f"features need {what} in a Box, got {space}")
+    return actions, observations
 
 
 def _checked_actions(actions: Any, space: Any, name: str = "actions") -> NDArray[np.float32]:

@@ -91,6 +91,9 @@ class Runtime:
     action_space: "Box[Any] | None" = None
     """Space of one robot's action, if it means something else than inside."""
 
+    observation_space: "Box[Any] | None" = None
+    """Space of one robot's observation, if more is shown than inside."""
+
     constants: ClassVar[frozenset[str]] = frozenset()
     """Attributes that never change, of other kinds than texts, frozen settings and functions: no state holds them."""
 
@@ -172,3 +175,10 @@ class Feature(Frozen):
     @abstractmethod
     def runtime(self, place: Place) -> Runtime:
         """The feature at work. Raises ValueError for a place where it cannot be."""
+
+    def added(self, size: int, width: int) -> int:
+        """Numbers that are shown behind an observation of that size, with actions of that width.
+
+        Only reward terms may follow a feature that adds some.
+        """
+        return 0

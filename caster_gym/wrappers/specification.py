@@ -10,6 +10,7 @@ from caster_gym.paths.naming import unknown_name
 from caster_gym.wrappers.commands import JointSpeeds, ResidualTorque, TwistCommands
 from caster_gym.wrappers.failures import MotorFailure
 from caster_gym.wrappers.feature import Feature
+from caster_gym.wrappers.history import History
 from caster_gym.wrappers.latency import ActionDelay, MotorLag
 from caster_gym.wrappers.odometry import Odometry
 from caster_gym.wrappers.packets import DroppedPackets
@@ -35,6 +36,7 @@ AnyFeature: TypeAlias = (
     | Odometry
     | DroppedPackets
     | MotorFailure
+    | History
     | Payload
     | Friction
     | WheelErrors

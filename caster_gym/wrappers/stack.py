@@ -41,17 +41,24 @@ class Stack:
     """
 
     def __init__(
-        self, engine: "TaskEngine", task: "TaskParameters", features: Sequence[Feature], space: "Box[Any]"
+        self,
+        engine: "TaskEngine",
+        task: "TaskParameters",
+        features: Sequence[Feature],
+        action_space: "Box[Any]",
+        observation_space: "Box[Any]",
     ) -> None:
         if any(isinstance(getattr(hook, "__self__", None), Stack) for hook in engine.on_restart):
             raise ValueError("this environment has been wrapped before: give all features to one call of wrap")
-        self._engine, self._task, self.action_space = engine, task, space
+        self._engine, self._task = engine, task
+        self.action_space, self.observation_space = action_space, observation_space
         self._clocks = np.zeros(engine.count, dtype=np.int64)
         # an array for each feature: a pickled or copied stack still shares them, as it would not share views of one
         self._seeds = [np.zeros(engine.count, dtype=np.uint64) for _ in features]
         self._coming = np.zeros((len(features), engine.count), dtype=np.uint64)  # of episodes that were started
         self._streams = streams([getattr(feature, "kind", type(feature).__name__) for feature in features])
         self._runtimes = [self._started(i, feature) for i, feature in enumerate(features)]
+        self._check_order(features)
         self._names = [f"{i}_{getattr(one, 'kind', type(one).__name__)}" for i, one in enumerate(features)]
         self._rewards = [one for one in self._runtimes if isinstance(one, RewardRuntime)]
         self._plants = [(i, one) for i, one in enumerate(self._runtimes) if isinstance(one, PlantRuntime)]
@@ -70,7 +77,18 @@ class Stack:
         width = self.action_space.shape[0]
         runtime = feature.runtime(Place(self._engine, self._task, width, self._seeds[index], self._clocks))
         self.action_space = runtime.action_space or self.action_space
+        self.observation_space = runtime.observation_space or self.observation_space
         return runtime
+
+    def _check_order(self, features: Sequence[Feature]) -> None:
+        """Refuse features behind one that shows more than they know of."""
+        for place, one in enumerate(features):
+            behind = zip(features[place + 1 :], self._runtimes[place + 1 :], strict=True)
+            if one.added(1, 1) and (
+                others := [later for later, runtime in behind if not isinstance(runtime, RewardRuntime)]
+            ):
+                first, second = (getattr(it, "kind", type(it).__name__) for it in (others[0], one))
+                raise ValueError(f"feature {first!r} must stand before {second!r}, which only reward terms may follow")
 
     def _check_plants(self) -> None:
         """Refuse plants that the time step cannot follow: at the ends of their ranges, and some draws between."""
