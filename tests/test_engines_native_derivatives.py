@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import caster_gym.engines.tensor.scalars  # noqa: F401  # tells the mechanics about tensors
 from caster_gym import load_robot
+from caster_gym.engines.native.compilation import compilations
 from caster_gym.engines.native.derivatives import DIFFERENTIABLE, TOGETHER, PeriodDerivatives
 from caster_gym.engines.native.fleet import Fleet
 from caster_gym.engines.native.threads import BLOCKS_PER_SHARE, get_threads, set_threads
@@ -167,6 +168,20 @@ def test_a_batch_of_batches():
     assert found.by_parameters.shape == (5, 3, 13, 0)
     alone = PeriodDerivatives(robots[1], STEP).at(states[1::3], torques[1::3])
     assert_array_equal(found.by_state[:, 1], alone.by_state)
+
+
+def test_arrays_may_lie_in_memory_as_they_like():
+    """Such as those that nobody may write to; nothing is compiled for them, and nothing is written to any."""
+    states, torques = random_states(10, 4)
+    derivatives = PeriodDerivatives(ROBOTS["chung2008"], STEP)
+    expected, before = derivatives.at(states, torques), (states.copy(), compilations())
+    turned, locked = np.asfortranarray(states), torques.copy()
+    turned.flags.writeable = locked.flags.writeable = False
+    for one, other in zip(derivatives.at(turned, locked.tolist()), derivatives.at(states, locked), strict=True):
+        assert_array_equal(one, other)
+    assert_array_equal(derivatives.at(states, locked).by_torque, expected.by_torque)
+    assert_array_equal(states, before[0])
+    assert compilations() == before[1]
 
 
 def test_a_payload_by_the_chain_rule():

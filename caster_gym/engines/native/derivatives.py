@@ -37,7 +37,6 @@ from caster_gym.mechanics.scalars import each, either, flatten, pairs
 from caster_gym.robot import Robot
 
 TOGETHER = 16  # robots of a block: differentiating them takes about as long as stepping a block of a fleet
-
 UNIT_TOLERANCE = 1e-6  # [-] of the lengths of directions, as `Fleet` has it
 
 _BODY = (0.0,) * BODY_ROWS
@@ -75,7 +74,6 @@ def _differentiate(
     end: int,
     states: Any,
     torques: Any,
-    ends: Any,
     tangents: Any,
     blocks: Any,
     robots: int,
@@ -86,7 +84,7 @@ def _differentiate(
     h: float,
     casters: tuple[int, ...],
 ) -> None:
-    """Move the robots of blocks first … end − 1 and keep their ends (count, rows) with tangents (count, rows, K).
+    """Move the states (count, rows) of robots in blocks first … end − 1, with their tangents (count, rows, K).
 
     by_state (rows, K), by_torque (2 N, K), by_parameters (fields, K) or None: what the tangents are at the start. Robot
     i has the parameters of number i % robots.
@@ -94,8 +92,8 @@ def _differentiate(
     torque_like = flatten(each(_two, (), casters))
     state_like = _BODY + torque_like  # two numbers for each caster there, too
     for i in range(first * TOGETHER, min(end * TOGETHER, len(states))):
-        values, slopes, number = borrowed(ends[i]), borrowed(tangents[i]), i % robots
-        values[:], slopes[:] = states[i], by_state
+        values, slopes, number = borrowed(states[i]), borrowed(tangents[i]), i % robots
+        slopes[:] = by_state
         robot = read_robot(blocks[number // LANES], number % LANES, 0, casters)
         given = take(torques[i], 0, torque_like)
         for _ in range(steps):
@@ -212,8 +210,7 @@ class PeriodDerivatives:
 
         Leading axes are a batch; of several robots, the last of them holds one state for each.
         """
-        states = np.ascontiguousarray(state, dtype=np.float64)
-        torques = np.ascontiguousarray(torque, dtype=np.float64)
+        states, torques = np.array(state, np.float64, order="C"), np.array(torque, np.float64, order="C")
         batch = states.shape[:-1]
         if states.shape != (*batch, self._rows) or torques.shape != (*batch, self._joints):
             raise ValueError(self._wrong_shapes(states, torques))
@@ -221,16 +218,16 @@ class PeriodDerivatives:
             raise ValueError(
                 f"state must hold {self._count} robots along its last axis but one, got shape {states.shape}"
             )
-        rows, joints = self._rows, self._joints
+        rows, free = self._rows, self._rows + self._joints
         count = states.size // rows
-        starts, given = states.reshape(count, rows), torques.reshape(count, joints)
-        if (wrong := _compiled_first_wrong(starts, given)) >= 0:
-            raise ValueError(_what_is_wrong(starts[wrong], given[wrong]))
-        ends, tangents = np.empty((count, rows)), np.empty((count, rows, self._directions))
-        over_blocks(_compiled_differentiate, -(-count // TOGETHER), starts, given, ends, tangents, *self._constants)
-        free, together = rows + joints, tangents.reshape(*states.shape, self._directions)
-        by_parameters = together[..., free : free + len(self.by)]
-        return Period(ends.reshape(states.shape), together[..., :rows], together[..., rows:free], by_parameters)
+        now, given = states.reshape(count, rows), torques.reshape(count, self._joints)
+        if (wrong := _compiled_first_wrong(now, given)) >= 0:
+            raise ValueError(_what_is_wrong(now[wrong], given[wrong]))
+        tangents = np.empty((*states.shape, self._directions))
+        flat = tangents.reshape(count, rows, self._directions)
+        over_blocks(_compiled_differentiate, -(-count // TOGETHER), now, given, flat, *self._constants)
+        by_parameters = tangents[..., free : free + len(self.by)]
+        return Period(states, tangents[..., :rows], tangents[..., rows:free], by_parameters)
 
     def _wrong_shapes(self, states: Array, torques: Array) -> str:
         last = f"state must have a last axis of {self._rows} and torque one of {self._joints}, their other axes alike"
