@@ -33,8 +33,10 @@ def interruptible() -> Iterator[None]:
     Once one of the two has come, SIGTERM does nothing more: what there is has still to be saved. Signals that the
     process was started to ignore stay ignored. In another thread than the main one nothing changes.
     """
+    came: list[int] = []
 
     def interrupt(number: int, _: FrameType | None) -> NoReturn:
+        came.append(number)
         signal.signal(signal.SIGTERM, _do_nothing)
         raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
@@ -47,6 +49,10 @@ def interruptible() -> Iterator[None]:
             signal.signal(number, interrupt)
     try:
         yield
+    except KeyboardInterrupt as error:
+        if came[:1] == [signal.SIGTERM] and not isinstance(error, Terminated):  # Ray makes one of its own of it
+            raise Terminated from error
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -95,6 +95,25 @@ def test_a_missing_library_is_named_with_its_extra(call, monkeypatch):
     assert_refused(call("design"), "this needs the Python package 'torch': pip install 'caster_gym[train]'")
 
 
+@pytest.mark.parametrize(
+    ("package", "command"),
+    [
+        ("optuna", ["sweep", "ppo_track"]),
+        ("ray", ["sweep", "ppo_track", "--workers", "ray"]),
+        ("ray", ["benchmark", "--workers", "ray"]),
+    ],
+)
+def test_many_machines_need_the_extra_scale(call, tmp_path, monkeypatch, package, command):
+    """Nothing is begun without its packages."""
+    users = ("caster_gym.agents.sweep.", "caster_gym.agents.workers.on_ray", f"{package}.")
+    for name in [one for one in sys.modules if one.startswith(users)]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)  # its import fails
+    refused = call(*command, "--out", "results")
+    assert_refused(refused, f"this needs the Python package {package!r}: pip install 'caster_gym[scale]'")
+    assert not (tmp_path / "results").exists()
+
+
 @pytest.mark.parametrize("command", [["train", *TINY], ["evaluate", "computed_torque"], ["benchmark"]])
 def test_results_are_not_overwritten(call, tmp_path, command):
     """What is there stays as it is, unless --overwrite is given."""

@@ -169,6 +169,12 @@ def test_what_is_wrong_with_an_agent_of_ones_own_is_said_in_a_sentence(own, algo
         own(algorithm)
 
 
+@pytest.mark.parametrize("algorithm", [[None], None, {}, [["ppo"]], 7, [], {"ppo": None}])
+def test_an_algorithm_that_is_no_name_is_told(tmp_path, algorithm):
+    with pytest.raises(ConfigurationError, match=r"settings\.yaml: .*algorithm.* module:Name$"):
+        read_agent(written(tmp_path, {"algorithm": algorithm}))
+
+
 def test_settings_of_ones_own_are_checked_like_all_others(own):
     with pytest.raises(ConfigurationError, match=r"unknown key 'gian'; did you mean 'gain'\?"):
         own("OWN:Resting", gian=1.0)

@@ -4,7 +4,10 @@ import csv
 import logging
 import os
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -114,6 +117,70 @@ def test_a_call_that_falls_silent_is_begun_elsewhere(cluster, tmp_path):
         workers.submit(Call("frozen", stop_once, (tmp_path,)))
         events = list(workers.events())
     assert events == [Reported(0, "begun once more"), Finished(0, "done")]
+
+
+STOPPED = """
+import os
+import signal
+import sys
+from pathlib import Path
+
+import typer
+
+from caster_gym.agents.commands.command_line import plain_errors
+from caster_gym.agents.workers.calls import Call
+from caster_gym.agents.workers.on_ray import RayWorkers
+
+def work(parent, report):
+    os.kill(parent, int(sys.argv[1]))  # which waits for it meanwhile
+    try:
+        while True:
+            pass
+    except KeyboardInterrupt:
+        Path(sys.argv[2]).touch()
+        raise
+
+def main(number: int, kept: Path):
+    with plain_errors("all is kept"), RayWorkers(1, 1) as workers:
+        workers.submit(Call("endless", work, (os.getpid(),)))
+        list(workers.events())
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    typer.run(main)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_command_lets_the_cluster_save_its_work(cluster, tmp_path, number, code):
+    """Ray itself would end it at SIGTERM, and kill what it had begun."""
+    script, kept = tmp_path / "stopped.py", tmp_path / "kept"
+    script.write_text(STOPPED, encoding="utf-8")
+    ended = run_python(cluster, [str(script), str(int(number)), str(kept)], tmp_path, code)
+    assert ended.stderr == "caster-gym: interrupted; all is kept\n"
+    assert kept.exists()
+
+
+def run_python(cluster, arguments, folder, code=0):
+    """Run Python in a folder, with RAY_ADDRESS."""
+    environment = {**os.environ, "RAY_ADDRESS": cluster[0].address, "PYTHONPATH": str(Path(__file__).parents[1])}
+    ended = subprocess.run(
+        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == code, ended.stderr
+    return ended
+
+
+def test_a_cluster_that_cannot_be_joined_is_told(monkeypatch):
+    def refuse(**_):
+        raise ConnectionError("Failed to connect")
+
+    monkeypatch.setenv("RAY_ADDRESS", "10.0.0.1:6379")
+    monkeypatch.setattr(ray, "is_initialized", lambda: False)
+    monkeypatch.setattr(ray, "init", refuse)
+    with pytest.raises(ConnectionError, match=r"no Ray cluster could be joined at 10\.0\.0\.1:6379: .*RAY_AUTH_MODE=t"):
+        RayWorkers(1, 1).__enter__()
 
 
 @pytest.mark.slow

@@ -98,6 +98,12 @@ def test_every_trajectory_has_a_name_of_its_own():
     assert np.allclose(built[1].samples[0, 0], 0.8)
 
 
+@pytest.mark.parametrize("laps", [0, 1001, 10**9, 10**30])
+def test_absurd_laps_are_refused_before_anything_is_built(laps):
+    with pytest.raises(ValueError, match=r"path 'circle': 'laps' should be (less|greater) than .*got "):
+        build_trajectories({"shape": "circle", "laps": laps}, ROBOT, 0.02)
+
+
 def test_errors_of_building_name_the_path():
     with pytest.raises(ValueError, match=r"path 'circle': a duration of 0\.1 s is 5 time steps"):
         build_trajectories({"shape": "circle", "duration": 0.1}, ROBOT, 0.02)

@@ -91,6 +91,15 @@ def test_sigterm_interrupts_once():
     assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)) == before
 
 
+def test_sigterm_stays_sigterm_where_a_library_makes_ctrl_c_of_it():
+    """Ray does, while it waits."""
+    with pytest.raises(Terminated), interruptible():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt from None
+
+
 def test_signals_that_are_ignored_stay_ignored():
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from caster_gym import durable_files
 from caster_gym.durable_files import MARK
 from caster_gym.report import run_folder
-from caster_gym.report.run_folder import begun, check_file, check_free, staged
+from caster_gym.report.run_folder import begun, check_can_be_made, check_file, check_free, staged
 
 OURS = ("*.txt", "events", "best/policy.yaml")
 
@@ -155,6 +156,23 @@ def test_a_folder_that_cannot_be_had_is_refused_before_the_work_begins(tmp_path,
             with pytest.raises(ValueError, match=f"^results cannot be written to .*: .*{why}; choose another --out$"):
                 opened.__enter__()
     assert content(tmp_path) == ["closed", "file", "link", "to-file"]
+
+
+@pytest.mark.parametrize("address", ["s3://bucket/run", "memory://run", "gs://bucket", "abfs+x://a"])
+def test_an_address_is_no_folder(tmp_path, monkeypatch, address):
+    """Rather than a folder called 's3:'. A drive of Windows has one letter."""
+    monkeypatch.chdir(tmp_path)
+    told = f"^results cannot be written to {re.escape(address)}, since locks and renames need a file system; give --out"
+    for opened in (
+        begun(Path(address), False, "*"),
+        begun(Path(address), False, "*", resume=True),
+        staged(Path(address), overwrite=False, ours=OURS),
+    ):
+        with pytest.raises(ValueError, match=told):
+            opened.__enter__()
+    assert content(tmp_path) == []
+    check_can_be_made(Path("c:/run"))
+    check_can_be_made(Path("run:2"))
 
 
 def test_advice_on_folders_that_are_not_empty_helps(tmp_path):

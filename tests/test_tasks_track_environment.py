@@ -13,6 +13,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from caster_gym import Model, load_robot
 from caster_gym.analysis.actuation import ActuationWarning
+from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.observation import observation_size
 from caster_gym.shipped_files import names_of
 from caster_gym.tasks.building import build_engine
@@ -259,6 +260,14 @@ def test_a_path_of_the_pool_can_be_chosen():
 def test_a_task_without_spread_starts_on_the_trajectory():
     _, info = CasterTrackEnv(start_offset=0.0, start_turn=0.0, **WIDE).reset(seed=0)
     assert_array_equal(info["pose"], info["reference_pose"])
+
+
+@pytest.mark.parametrize(
+    "preview", [(1e9,), (1e300,), (float("inf"),), (0.0,), tuple(0.02 * i for i in range(1, 1002))]
+)
+def test_absurd_horizons_are_refused_before_anything_is_compiled(preview):
+    with pytest.raises(ConfigurationError, match=r"^the task 'track': .*'preview'.* (should be|at most 1000 are read)"):
+        CasterTrackEnv(preview=preview)
 
 
 def test_a_task_without_preview_works():

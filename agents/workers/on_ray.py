@@ -8,6 +8,7 @@ given none for a while is begun on another machine. Whoever wakes up then learns
 import logging
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -59,7 +60,7 @@ class RayWorkers(Workers):
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         self._begun = not ray.is_initialized()
         if self._begun:
-            ray.init(log_to_driver=False, logging_level=logging.ERROR, include_dashboard=False)
+            _join()
         here = NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
         self._signs = ray.remote(_Signs).options(num_cpus=0, scheduling_strategy=here).remote(self._silent)
         return self
@@ -139,6 +140,21 @@ class RayWorkers(Workers):
                 ray.shutdown()
             elif self._signs is not None:
                 ray.kill(self._signs)
+
+
+def _join() -> None:
+    """Join a cluster, or start one; SIGTERM does what it did before, whereas Ray would end the process at once."""
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        ray.init(log_to_driver=False, logging_level=logging.ERROR, include_dashboard=False)
+    except ConnectionError as error:
+        raise ConnectionError(
+            f"no Ray cluster could be joined at {os.environ.get('RAY_ADDRESS', 'this machine')}: `ray start --head` "
+            "starts one, and RAY_ADDRESS names its address; if it asks for a token, set RAY_AUTH_MODE=token"
+        ) from error
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)
 
 
 class _Signs:

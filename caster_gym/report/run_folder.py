@@ -7,6 +7,7 @@ that is a link holds for the folder that it leads to.
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -24,6 +25,7 @@ from caster_gym.durable_files import (
 
 BEFORE = f"{MARK}-before"  # within a folder: the results that are overwritten, and all other files are new
 MOVING = f"{MARK}-moving"  # the same on their way there or back: all other files are old
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # of an address such as s3://bucket/run; a drive has one letter
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")  # which systems leave wherever a person looks
 
 
@@ -81,6 +83,12 @@ def _is_one_of(file: Path, patterns: Sequence[str]) -> bool:
 
 def check_can_be_made(folder: Path) -> None:
     """Refuse a folder that cannot be made or written to, in a sentence; leaves nothing behind."""
+    if _SCHEME.fullmatch(folder.parts[0] if folder.parts else ""):
+        address = f"{folder.parts[0]}//{'/'.join(folder.parts[1:])}"
+        raise ValueError(
+            f"results cannot be written to {address}, since locks and renames need a file system; give --out a folder, "
+            "which several machines must see under the same name"
+        )
     try:
         above = next(one for one in (folder.absolute(), *folder.absolute().parents) if one.exists() or one.is_symlink())
         if above.is_dir():
