@@ -8,7 +8,7 @@ import numpy as np
 from caster_gym.arena.arena import read_arena
 from caster_gym.arrays import Array, Flags
 from caster_gym.envs.native.engine import TaskEngine
-from caster_gym.mechanics.contact_impulses import SETTLED
+from caster_gym.mechanics.contact_impulses import RESTING, SETTLED
 from caster_gym.mechanics.dynamics import kinetic_energy
 from caster_gym.mechanics.free_casters import slip_energy
 from caster_gym.mechanics.grip_or_slip import own_joint_rates
@@ -70,10 +70,15 @@ class Energy:
     they may work at speeds as small, by (1 + μ) J SETTLED in normal and tangential direction; of robots that are held
     against a wall, that is all the energy there is. These three are the slack. All that robots can ever have is thus
     what motors and pushes gave them in their episode.
+
+    Robots that lie against something bounce within a time step, to and fro at less than RESTING: what the speeds at its
+    ends tell of the work between may be wrong altogether. Theirs counts as any up to ½ τ (|ω₀| + |ω₁|) T.
     """
 
     def __init__(self, engine: TaskEngine, time_step: float, friction: float) -> None:
         self.engine, self.time_step = engine, time_step
+        outline = engine.robot.platform.footprint.outline
+        self.radius = float(np.hypot(*np.array(outline.corners).T).max()) + outline.radius  # [m] about C
         self.contact = (1.0 + friction) * SETTLED  # [m/s] at which a normal impulse may work
         self.look()
 
@@ -102,9 +107,18 @@ class Energy:
         slack = 0.5 * self.time_step * (self.torques * abs(self.speeds - speeds)).sum(axis=(0, 1))
         slack = slack + 0.5 * period * (abs(wrench) * abs(v1 - v0)).sum(axis=0)
         slack = slack + self.contact * impulse
+        lying = (impulse > 0.0) & self._is_slow(before) & self._is_slow(after)
+        told = 0.5 * period * (self.torques * (abs(speeds) + abs(self.speeds))).sum(axis=(0, 1))
+        slack = slack + np.where(lying, told, 0.0)
         size = kinetic + self.kinetic + abs(work)
         share: Array = (self.kinetic - kinetic - work - slack) / np.maximum(size, STILL)
         return share
+
+    def _is_slow(self, state: State) -> Flags:
+        """Whose platform moves slower than RESTING everywhere."""
+        vx, vy, omega = np.array(state.twist)
+        slow: Flags = np.hypot(vx, vy) + self.radius * abs(omega) < RESTING
+        return slow
 
     def _store(self, state: State) -> None:
         self.state, self.kinetic = state, self._kinetic(state)

@@ -48,8 +48,8 @@ def test_memory_that_grows_after_the_first_round_is_found(tmp_path):
     """What a round of kinds compiles is no growth, nor what the processes before this one held."""
     row = soak.Row._make(kind() for kind in soak.Row.__annotations__.values())
     first = [row._replace(process=1, memory=100.0 * (1 + number)) for number in range(KINDS)]
-    steady = [row._replace(process=1, memory=100.0 * KINDS * (1.0 + GROWTH))]
+    steady = [row._replace(process=1, memory=memory) for memory in (1210.0, 1190.0, 1205.0) * 3]
     other = [row._replace(process=2, memory=900.0)]
     assert faults_of(first + steady) == faults_of(first + steady + other) == []
-    grown = faults_of([*first, *steady, row._replace(process=1, memory=1300.0)])
-    assert grown == ["memory grew from 1200 to 1300 MB in 2 legs"]
+    grown = [one._replace(memory=one.memory * (1.0 + 2.0 * GROWTH)) for one in steady]
+    assert faults_of([*first, *steady, *grown, *grown]) == ["memory grew from 1205 to 1326 MB"]
