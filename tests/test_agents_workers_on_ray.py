@@ -12,12 +12,14 @@ from typing import Any
 
 import pytest
 import ray
+import yaml
 from ray.cluster_utils import Cluster
 
 from caster_gym.agents.learning.settings import PPOSettings
 from caster_gym.agents.learning.training import Job, train, train_all
 from caster_gym.agents.workers.calls import Call, Finished, Reported
 from caster_gym.agents.workers.on_ray import RayWorkers, _Signs
+from tests.guesses import write_guesses
 from tests.test_agents_learning_training import TASK
 
 PPO = PPOSettings(
@@ -63,7 +65,12 @@ def test_a_call_is_silent_once_and_one_that_has_not_begun_is_not(monkeypatch):
 @pytest.fixture(scope="module")
 def cluster():
     """A real one with a machine for whoever submits, and two that work, each with one core."""
-    quick = {"health_check_period_ms": 500, "health_check_timeout_ms": 2000, "health_check_failure_threshold": 4}
+    quick = {
+        "health_check_period_ms": 500,
+        "health_check_timeout_ms": 2000,
+        "health_check_failure_threshold": 4,
+        "worker_niceness": 0,
+    }
     head = {"num_cpus": 0, "object_store_memory": 80_000_000, "_system_config": quick, "include_dashboard": False}
     made = Cluster(initialize_head=True, head_node_args=head)
     nodes = [made.add_node(num_cpus=1, object_store_memory=80_000_000) for _ in range(2)]
@@ -117,6 +124,36 @@ def test_a_call_that_falls_silent_is_begun_elsewhere(cluster, tmp_path):
         workers.submit(Call("frozen", stop_once, (tmp_path,)))
         events = list(workers.events())
     assert events == [Reported(0, "begun once more"), Finished(0, "done")]
+
+
+SWEEP = {"task": "task.yaml", "agent": "guess.yaml", "trials": 3, "at_once": 2, "storage": "journal"}
+GAIN = {"agent.gain": {"low": 0.01, "high": 1.0, "log": True}}
+BENCHMARK = {"task": "task.yaml", "agents": ["guess.yaml"], "seeds": [0, 1]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("command", "settings", "same"),
+    [
+        (["sweep"], {**SWEEP, "space": GAIN}, ["table.md", "trials.csv", "best.yaml", "search.png"]),
+        (["benchmark", "--config"], BENCHMARK, ["table.md", "episodes.csv", "summary.csv"]),
+    ],
+)
+def test_commands_on_the_cluster_of_ray_address_leave_the_bytes_of_local_processes(
+    cluster, tmp_path, command, settings, same
+):
+    """All but clock times, and what Optuna and TensorBoard write."""
+    write_guesses(tmp_path)
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    found = []
+    for kind in ("local", "ray"):
+        words = [*command, "settings.yaml", "--workers", kind, "--out", kind]
+        run_python(cluster, ["-m", "caster_gym", *words], tmp_path)
+        content = [tmp_path / kind / name for name in same]
+        weights = sorted((tmp_path / kind).rglob("*.safetensors"))
+        assert len(weights) >= 4
+        found.append({str(one.relative_to(tmp_path / kind)): one.read_bytes() for one in (*content, *weights)})
+    assert found[0] == found[1]
 
 
 STOPPED = """
