@@ -1,5 +1,6 @@
 """How tests are spread over the cores, and which come first; and how they call a command."""
 
+import gc
 import os
 from collections import Counter
 from importlib.util import find_spec
@@ -16,6 +17,20 @@ collect_ignore_glob = [
     *(["test_agents_sweep_s*.py", "test_measure_scaling.py"] if find_spec("optuna") is None else []),
     *(["test_agents_workers_on_ray.py"] if find_spec("ray") is None else []),
 ]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collects tests without garbage collections, which would look again and again at objects that all stay.
+
+    Later collections leave them out: each would else take half a second for what thousands of tests and Torch hold.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items):
