@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque import ComputedTorque, frame_rate
 from caster_gym.arrays import Array
 from caster_gym.envs.observation import ObservationLayout
 
@@ -136,10 +136,11 @@ class Cheat(ComputedTorque):
         super().__init__(layout, 10.0, period)
         self._drive, self._steps = drive, 0
 
-    def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
+    def _accelerations(self, observations: NDArray[np.float32], twist: Array) -> tuple[Array, Array]:
         wanted = self._drive(observations, self.layout, self._steps * self.period)
         self._steps += 1
-        return 10.0 * (wanted - twist)
+        acceleration = 10.0 * (wanted - twist) + frame_rate(twist)
+        return acceleration, acceleration
 
 
 class FullTorque:

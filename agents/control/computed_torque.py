@@ -1,10 +1,28 @@
 """Computed torque: feedback linearisation in operational space, and torques within the motors' limits.
 
     e, ė     reference minus robot: position, heading, and their rates, components in B
-    a        wanted acceleration a_ref + k_d ė + k_p e                [m/s², rad/s²]
+    a        wanted acceleration a_ref + k_d ė + k_p e, a derivative in the world            [m/s², rad/s²]
+    v        twist (vx, vy, ω) at C, in B                                                    [m/s, m/s, rad/s]
     F        M v̇ + h + friction, with v̇ the rate of the twist's components that a means
+    T        control period, over which torques are held                                     [s]
 
 With the exact model every error obeys ë + k_d ė + k_p e = 0 while no motor is at its limit.
+
+Torques that are held act in the frame of a robot that turns and on casters that steer. Were F and the motors' wrenches
+B taken at the start of the period, the acceleration would lag by half a period: the wrench alone turns by ωT/2 on
+average, which costs (ωT/2) a and leaves an error of (ωT/2) a / k_p, of first order in T. Here they are taken in the
+middle of the period, t = T/2, where what changes linearly over the period cancels; the error that is left is of second
+order. Until then the robot is taken to accelerate as its reference, a_ref: the feedback's part would add errors times T,
+and may be beyond the motors. With R(φ) the rotation by φ and α the third component of a_ref,
+
+    φ = ω t + α t²/2        heading gained
+    v(t) = R(−φ) (v + a_ref t)        components in B as it stands then
+    δ(t) = δ + t δ̇(δ + δ̇ t/2, v(t/2))        steering, by the midpoint rule
+
+A held torque gives the robot the mean acceleration of a reference with jerk j, and so its velocity at the next sample,
+but not its place: the held wrench turns with the robot, as a jerk ω × a, and the rest of j moves the reference by
+j T³/6 − (T/2 · j) T²/2 = −j T³/12 per period. With feedback of ė the error would settle where k_p e = k_d T² j/12. The
+places meet where the velocities differ by ė = T²/12 (j − ω × a) instead, and that is subtracted from ė.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +41,8 @@ from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.mechanics.motors import torque_range
 from caster_gym.robot import Robot
+
+LEAST_HORIZON = 0.02  # [s] of a preview whose places tell the jerk: rounding of 1e-8 m becomes 0.03 m/s³
 
 KnownModel = Literal["exact", "without D1", "without wheels"]
 
@@ -53,6 +73,14 @@ def known_model(robot: Robot, known: KnownModel) -> Model:
     if known == "without wheels":
         return Model(robot.without_wheels())
     raise ValueError(f"known must be 'exact', 'without D1' or 'without wheels', got {known!r}")
+
+
+class Motion(NamedTuple):
+    """How robots move at some time of a control period."""
+
+    turn: Array  # (robots,) heading gained since its start [rad]
+    twist: Array  # (robots, 3)
+    steering: Array  # (robots, casters) [rad]
 
 
 class ComputedTorque:
@@ -91,45 +119,86 @@ class ComputedTorque:
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (robots, driven joints) for observations (robots, size)."""
-        see = self.layout.physical
-        cos_sin = see(observations, "directions").reshape(len(observations), -1, 2)
+        cos_sin = self.layout.physical(observations, "directions").reshape(len(observations), -1, 2)
         steering = np.arctan2(cos_sin[..., 1], cos_sin[..., 0])
-        twist = see(observations, "twist")
-        force = self._model.inverse_dynamics(steering, twist, self._twist_rate(observations, twist))
-        b = self._model.motor_wrenches(steering)
-        speeds = (twist[:, None] @ b)[:, 0] / self._max_torque  # a motor's wrench and its speed have the same row
+        twist = self.layout.physical(observations, "twist")
+        reference, wanted = self._accelerations(observations, twist)
+        middle = self._ahead(steering, twist, reference, 0.5 * self.period)
+        rate = _seen_after(middle.turn, wanted) - frame_rate(middle.twist)
+        force = self._model.inverse_dynamics(middle.steering, middle.twist, rate)
+        b = self._model.motor_wrenches(middle.steering)
+        speeds = (middle.twist[:, None] @ b)[:, 0] / self._max_torque  # a motor's wrench and speed have the same row
         low, high = torque_range(speeds, np.ones_like(speeds), self._max_speed)
         b[:, 2] /= self._model.characteristic_length
         force[:, 2] /= self._model.characteristic_length
         return distribute(b, force, low, high).astype(np.float32)
 
-    def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
-        """Rate of the twist's components (robots, 3) that brings the errors down as the gains say."""
+    def _ahead(self, steering: Array, twist: Array, acceleration: Array, time: float) -> Motion:
+        """How robots move after some time [s] of an acceleration (robots, 3), constant in the world, given in B now."""
+
+        def turn_and_twist(t: float) -> tuple[Array, Array]:
+            turn = t * (twist[:, 2] + 0.5 * t * acceleration[:, 2])
+            return turn, _seen_after(turn, twist + t * acceleration)
+
+        half = 0.5 * time
+        halfway = steering + half * self._model.rates(steering, twist)[2]
+        steering_rates = self._model.rates(halfway, turn_and_twist(half)[1])[2]
+        return Motion(*turn_and_twist(time), steering + time * steering_rates)
+
+    def _accelerations(self, observations: NDArray[np.float32], twist: Array) -> tuple[Array, Array]:
+        """Accelerations (robots, 3) of the reference, and the wanted ones, which bring errors down as the gains say."""
         see = self.layout.physical
         heading = see(observations, "heading_error")
         turn = np.arctan2(heading[:, 1], heading[:, 0])
         error = np.concatenate([see(observations, "position_error"), turn[:, None]], axis=1)
         rate = see(observations, "twist_error")
-        wanted = self._mean_acceleration(observations, twist + rate)
-        wanted = wanted + self.gains.damping * rate + self.gains.stiffness * error
-        wanted[:, 0] += twist[:, 2] * twist[:, 1]
-        wanted[:, 1] -= twist[:, 2] * twist[:, 0]
-        return wanted
+        jerk = self._jerk(observations, twist + rate)
+        reference = see(observations, "reference_acceleration") + 0.5 * self.period * jerk  # in the middle
+        turning = frame_rate(np.column_stack([reference[:, :2], twist[:, 2]]))
+        rate -= self.period**2 / 12.0 * (jerk - turning)
+        return reference, reference + self.gains.damping * rate + self.gains.stiffness * error
 
-    def _mean_acceleration(self, observations: NDArray[np.float32], velocity: Array) -> Array:
-        """Reference acceleration (robots, 3) in the middle of the coming period; the preview shows its jerk."""
-        now = self.layout.physical(observations, "reference_acceleration")
+    def _jerk(self, observations: NDArray[np.float32], velocity: Array) -> Array:
+        """Jerk (robots, 3) of the reference, which the preview shows; zero without a preview.
+
+        velocity (robots, 3) of the reference. With Δp and Δv what place and velocity of the nearest previewed point, h
+        ahead, differ from those of constant acceleration, a jerk that is j now and changes linearly makes
+        Δp = h³/6 j + h⁴/24 j̇ and Δv = h²/2 j + h³/6 j̇, so that j = 24 Δp/h³ − 6 Δv/h². Where h is not known exactly, or
+        so short that Δp drowns in the observation's single precision, the jerk is taken to be constant: j = 2 Δv/h².
+        """
+        see = self.layout.physical
         if not self.layout.preview:
-            return now
+            return np.zeros_like(velocity)
+        now = see(observations, "reference_acceleration")
         ahead = min(self.layout.preview)
-        later = self.layout.physical(observations, f"preview_{ahead:g}{self.layout.unit}")[:, 4:]
+        point = see(observations, f"preview_{ahead:g}{self.layout.unit}")
         horizon = np.full((len(now), 1), ahead)
         if self.layout.unit == "m":
-            speeds = np.hypot(*velocity[:, :2].T) + np.hypot(*later[:, :2].T)
+            speeds = np.hypot(*velocity[:, :2].T) + np.hypot(*point[:, 4:6].T)
             horizon[:, 0] = np.maximum(2.0 * ahead / np.maximum(speeds, 1e-9), self.period)
-        jerk = 2.0 * (later - velocity - horizon * now) / horizon**2
-        mean: Array = now + 0.5 * self.period * jerk
-        return mean
+        faster = point[:, 4:] - velocity - horizon * now
+        if self.layout.unit == "m" or ahead < LEAST_HORIZON:
+            constant: Array = 2.0 * faster / horizon**2
+            return constant
+        cos, sin = see(observations, "heading_error").T
+        turn = np.arctan2(point[:, 3] * cos - point[:, 2] * sin, point[:, 2] * cos + point[:, 3] * sin)
+        moved = np.column_stack([point[:, :2] - see(observations, "position_error"), turn])
+        farther = moved - horizon * velocity - 0.5 * horizon**2 * now
+        jerk: Array = 24.0 * farther / horizon**3 - 6.0 * faster / horizon**2
+        return jerk
+
+
+def frame_rate(twist: Array) -> Array:
+    """ω × v (robots, 3), by which the rate of a vector (vx, vy) exceeds that of its components in a frame of rate ω."""
+    vx, vy, omega = twist.T
+    return np.stack([-omega * vy, omega * vx, np.zeros_like(omega)], axis=1)
+
+
+def _seen_after(turn: Array, vector: Array) -> Array:
+    """Components (robots, 3) of a vector in the frame of robots that have turned [rad] since they were given."""
+    c, s = np.cos(turn), np.sin(turn)
+    x, y, z = vector.T
+    return np.stack([c * x + s * y, c * y - s * x, z], axis=1)
 
 
 class ComputedTorqueSettings(ControllerSettings):

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque import ComputedTorque, frame_rate
 from caster_gym.arrays import Array
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import Robot
@@ -47,9 +47,10 @@ class KeyboardDriver(ComputedTorque):
         """What tables and figures call it."""
         return "keyboard"
 
-    def _twist_rate(self, observations: NDArray[np.float32], twist: Array) -> Array:
-        rate: Array = self._rate * (self._greatest * wanted_shares(self._held()) - twist)
-        return rate
+    def _accelerations(self, observations: NDArray[np.float32], twist: Array) -> tuple[Array, Array]:
+        rate = self._rate * (self._greatest * wanted_shares(self._held()) - twist)
+        acceleration = rate + frame_rate(twist)
+        return acceleration, acceleration
 
 
 def greatest_twist(robot: Robot) -> Array:
