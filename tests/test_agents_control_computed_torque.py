@@ -206,7 +206,7 @@ def test_the_heading_error_is_taken_the_short_way():
 def test_robots_with_coupled_motors_track(robot):
     """Four casters, friction, and drive motors that turn with the steering.
 
-    What is left comes from caster flips within a held torque: measured 0.04 and 0.06 mm at worst, 0.008 and 0.014 mm rms.
+    What is left comes from caster flips within a held torque: measured 0.04 and 0.06 mm at worst, 0.01 mm rms.
     With a gear that the controller does not know, torques would be wrong by half of those of the other motor.
     """
     batch, agent = make(robot)

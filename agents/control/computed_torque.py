@@ -12,8 +12,8 @@ Torques that are held act in the frame of a robot that turns and on casters that
 B taken at the start of the period, the acceleration would lag by half a period: the wrench alone turns by ωT/2 on
 average, which costs (ωT/2) a and leaves an error of (ωT/2) a / k_p, of first order in T. Here they are taken in the
 middle of the period, t = T/2, where what changes linearly over the period cancels; the error that is left is of second
-order. Until then the robot is taken to accelerate as its reference, a_ref: the feedback's part would add errors times T,
-and may be beyond the motors. With R(φ) the rotation by φ and α the third component of a_ref,
+order. Until then the robot is taken to accelerate as its reference, a_ref: the part of the feedback would add errors
+times T, and may be beyond the motors. With R(φ) the rotation by φ and α the third component of a_ref,
 
     φ = ω t + α t²/2        heading gained
     v(t) = R(−φ) (v + a_ref t)        components in B as it stands then
