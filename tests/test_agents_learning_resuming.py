@@ -165,6 +165,46 @@ def test_a_record_that_was_deleted_says_so(undisturbed, tmp_path):
         train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
 
 
+@pytest.mark.parametrize("stopped", [False, True])
+@pytest.mark.parametrize("what", ["checkpoints", "checkpoints/0000000016/weights.safetensors"])
+def test_a_policy_that_is_gone_is_told_and_nothing_is_changed(undisturbed, tmp_path, stopped, what):
+    """Of a completed training, and of one that was stopped."""
+    folder, copies = undisturbed("shac")
+    shutil.copytree(copies[-1] if stopped else folder, tmp_path / "run")
+    gone = tmp_path / "run" / what
+    shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
+    before = sorted(tmp_path.rglob("*"))
+    remedy = "delete .*state to begin anew" if stopped else "put it back, or train anew"
+    with pytest.raises(ConfigurationError, match=rf"there is no file '.*0000000016.*{remedy}"):
+        train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
+    if not stopped:
+        assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("file", "damage", "words"),
+    [
+        ("best/weights.safetensors", lambda content: content[:50], "of which something is gone: .*weights"),
+        ("best/policy.yaml", None, "of which something is gone: there is no policy in"),
+        ("validation.csv", None, "of which something is gone: there is no file .*validation.csv"),
+        ("run.yaml", None, "holds best, but no run.yaml, which says how that was made"),
+        ("run.yaml", lambda content: content.replace(b"agent:", b"agnt:", 1), "does not say with which 'agent' the"),
+        (
+            "run.yaml",
+            lambda content: content.replace(b"completed: true", b"completed: 3"),
+            "'completed' should be true or false, got 3",
+        ),
+    ],
+)
+def test_a_completed_training_that_is_damaged_says_so(undisturbed, tmp_path, file, damage, words):
+    folder, _ = undisturbed("shac")
+    shutil.copytree(folder, tmp_path / "run")
+    path = tmp_path / "run" / file
+    path.unlink() if damage is None else path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(ConfigurationError, match=words):
+        train(ON_TENSORS, LEARNERS["shac"], 3, tmp_path / "run", nothing, resume=True)
+
+
 class Counting(LearnerSettings):
     """A learner of a user's own, which goes on as docs/resuming.md says; it learns nothing."""
 

@@ -22,8 +22,20 @@ OF_SCALE = ("optuna", "ray")  # packages of that extra
 LONGEST_MESSAGE = 1000  # characters
 DEFAULT_THREADS = learning_threads()
 
-Out = Annotated[Path, typer.Option(help="Folder for the results. It must be empty or not exist yet.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Delete the contents of that folder first.")]
+
+def _folder(name: str | Path) -> Path:
+    if not str(name):  # which Path would take for the working folder
+        raise typer.BadParameter("a folder needs a name, got ''; the working folder is called .")
+    return Path(name)
+
+
+Out = Annotated[
+    Path,
+    typer.Option(help="Folder for the results. It must be empty or not exist yet.", parser=_folder, metavar="PATH"),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Delete results in that folder first; refused if it holds other files.")
+]
 Resume = Annotated[
     bool,
     typer.Option("--resume", help="Go on in that folder, wherever it was stopped; begin if it is empty."),

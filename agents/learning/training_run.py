@@ -18,6 +18,7 @@ from caster_gym.agents.comparison.validation import Validation, verdict_on, writ
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.bundle import Bundle, PolicyDescription, save_bundle
 from caster_gym.agents.learning.progress import Events, ProgressTable, plain
+from caster_gym.agents.learning.resuming import check_checkpoints, checkpoint_name
 from caster_gym.agents.learning.saved_state import Snapshot, load_state, save_state
 from caster_gym.agents.learning.settings import GradientLearner, LearnerSettings, scheduled
 from caster_gym.configuration import ConfigurationError
@@ -127,9 +128,16 @@ class Run:
         """Let the folder hold what it held when the state was saved that is gone on from; or nothing."""
         remove_leftovers(self.folder, locked=True)
         checkpoints = self.folder / "checkpoints"
+        try:
+            check_checkpoints(self.folder, self.history)
+        except ValueError as error:
+            raise ConfigurationError(
+                f"{error}, which was there when the state of this training was saved: put it back, or delete "
+                f"{self.state_folder} to begin anew"
+            ) from error
         if checkpoints.is_dir():
             remove_leftovers(checkpoints, locked=True)
-            known = {_name(one.steps) for one in self.history}
+            known = {checkpoint_name(one.steps) for one in self.history}
             for one in checkpoints.iterdir():
                 if one.name not in known:
                     shutil.rmtree(one)
@@ -148,7 +156,7 @@ class Run:
         """Let best/ hold the policy that was validated then."""
         with scratch_folder(self.folder) as scratch:
             fresh = scratch / "best"
-            shutil.copytree(self.folder / "checkpoints" / _name(result.steps), fresh)
+            shutil.copytree(self.folder / "checkpoints" / checkpoint_name(result.steps), fresh)
             replace_folder(fresh, self.folder / "best")
 
     @property
@@ -197,7 +205,7 @@ class Run:
         )
         self.history.append(result)
         self.record(self.steps, {f"validation/{name}": value for name, value in result.numbers.items()})
-        save_bundle(self.folder / "checkpoints" / _name(self.steps), bundle)
+        save_bundle(self.folder / "checkpoints" / checkpoint_name(self.steps), bundle)
         if self.best is None or result.verdict.merit > self.best.verdict.merit:
             self.best = result
             self._keep_best(result)
@@ -229,8 +237,3 @@ class Run:
             trained_with={"settings": self.settings.model_dump(mode="json"), "seed": self.seed, "steps": self.steps},
             versions=versions(),
         )
-
-
-def _name(steps: int) -> str:
-    """Name of the folder of a policy that was validated after so many steps."""
-    return f"{steps:010d}"
