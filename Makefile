@@ -42,7 +42,7 @@ test: style ## Style, then all tests, a worker on each core, with types beside t
 	$(PYTEST); failed=$$?; \
 	wait $$types || failed=1; cat .venv/types.txt; exit $$failed
 
-quick: $(INSTALLED) ## The fast tests alone, in less than 90 s on two cores once their code is compiled
+quick: $(INSTALLED) ## The fast tests alone, in about two minutes on two cores once their code is compiled
 	$(PYTEST) -m "not slow" --ignore tests/papers
 
 papers-test: $(INSTALLED) ## Tests of papers/ alone
