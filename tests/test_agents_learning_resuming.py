@@ -192,7 +192,7 @@ def test_a_policy_that_is_gone_is_told_and_nothing_is_changed(undisturbed, tmp_p
         (
             "run.yaml",
             lambda content: content.replace(b"completed: true", b"completed: 3"),
-            "'completed' should be true or false, got 3",
+            "run.yaml says completed: 3, which should be true or false",
         ),
     ],
 )

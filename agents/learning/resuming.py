@@ -41,7 +41,7 @@ def is_completed(folder: Path, facts: Mapping[str, Any], what: str = "training",
             )
     completed = found.get("completed", False)
     if not isinstance(completed, bool):
-        raise ConfigurationError(f"{path}: 'completed' should be true or false, got {brief(completed)}")
+        raise ConfigurationError(f"{path} says completed: {brief(completed)}, which should be true or false")
     return completed
 
 

@@ -149,8 +149,9 @@ def _join() -> None:
         ray.init(log_to_driver=False, logging_level=logging.ERROR, include_dashboard=False)
     except ConnectionError as error:
         raise ConnectionError(
-            f"no Ray cluster could be joined at {os.environ.get('RAY_ADDRESS', 'this machine')}: `ray start --head` "
-            "starts one, and RAY_ADDRESS names its address; if it asks for a token, set RAY_AUTH_MODE=token"
+            f"no Ray cluster could be joined at {os.environ.get('RAY_ADDRESS', 'this machine')}: "
+            "docs/scaling.md tells how to start one; RAY_ADDRESS names its address; if it asks for a token, set "
+            "RAY_AUTH_MODE=token"
         ) from error
     finally:
         if threading.current_thread() is threading.main_thread():
