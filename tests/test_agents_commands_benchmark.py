@@ -243,56 +243,6 @@ def test_an_unknown_agent_is_told_before_anything_is_trained(tmp_path, settings)
 
 
 @pytest.mark.slow
-def test_scenarios_are_compared_each_for_itself_and_together(tmp_path, settings):
-    """Tuned for each or for one of them; a learned agent is trained for what it is prepared for, once for each seed."""
-    learner = settings.agents[1]
-    controller = write(tmp_path, "controller", {"algorithm": "computed torque", "natural_frequencies": [5.0, 30.0]})
-    folder = tmp_path / "out"
-    scenarios = {"calm": [], "late": [{"kind": "action_delay", "periods": 2}]}
-    content = settings.model_dump() | {
-        "scenarios": scenarios,
-        "agents": [
-            controller,
-            {"agent": controller, "prepared_for": "calm"},
-            {"agent": learner, "prepared_for": "late"},
-        ],
-        "seeds": (2,),
-        "starts": 1,
-    }
-    comparison = read_comparison(BenchmarkSettings(**content), {"n_timesteps": 256, "validations": 1})
-    text = run_benchmark(comparison, folder)
-    assert (folder / "table.md").read_text(encoding="utf-8") == text + "\n"
-    told = [row["scenario"] for row in rows(folder / "scenarios.csv")]
-    assert {one: told.count(one) for one in told} == dict.fromkeys(scenarios, 3 * len(TrackMetrics._fields))
-    assert [one.name for one in (folder / "policies").iterdir()] == ["ppo_for_late-2"]
-    facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
-    assert {name: one["natural_frequencies"] for name, one in facts["tuned"].items()} == {
-        "controller-calm": [30.0],
-        "controller-late": [5.0],  # the stiffer one is unstable with that delay
-        "controller_for_calm": [30.0],
-    }
-    episodes = {one: rows(folder / one / "episodes.csv") for one in scenarios}
-    model = ("controller", "controller_for_calm")
-    calm = [[row for row in episodes["calm"] if row["agent"] == name] for name in model]
-    assert [{**row, "agent": ""} for row in calm[0]] == [{**row, "agent": ""} for row in calm[1]]
-    failed = {name: sum(float(row["failed"]) for row in episodes["late"] if row["agent"] == name) for name in model}
-    errors = {
-        name: np.mean([float(row["position_rmse"]) for row in episodes["late"] if row["agent"] == name])
-        for name in model
-    }
-    assert (failed["controller"], errors["controller"]) < (failed["controller_for_calm"], errors["controller_for_calm"])
-
-
-def test_an_agent_that_would_see_or_do_what_it_does_not_know_is_told(tmp_path, settings):
-    scenarios = {"plain": [], "commanded": ["twist_commands"]}
-    agents = [{"agent": settings.agents[1], "prepared_for": "plain"}]
-    asked = BenchmarkSettings(**settings.model_dump() | {"scenarios": scenarios, "agents": agents})
-    with pytest.raises(ConfigurationError, match=r"'ppo_for_plain' is prepared for scenario 'plain', but actions of"):
-        run_benchmark(read_comparison(asked), tmp_path)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
 def test_following_is_compared_in_the_same_way(tmp_path):
     """One definition serves both tasks: another table, another figure, the same files."""
     task = {

@@ -104,7 +104,8 @@ class TorchFleet:
         tensor = torch.as_tensor(value, dtype=self.dtype, device=self.device)
         if self._floor is not None and tensor.shape == (self.count, self._rolling_rows):
             # Torch ships this one function without types
-            tensor = torch.stack(torch.broadcast_tensors(*self._rolling(tensor)), 1)  # type: ignore[no-untyped-call]
+            alike = torch.broadcast_tensors(*self._rolling(tensor))  # type: ignore[no-untyped-call]  # Torch's, untyped
+            tensor = torch.stack(alike, 1)
         if tensor.shape != (self.count, self._rows):
             n, slippery = self._torque_rows // 2, self._floor is not None
             raise ValueError(wrong_state(tuple(tensor.shape), self.count, n, slippery))

@@ -61,4 +61,5 @@ class TorchModel(RobotModel[Tensor]):
     def _stack(self, parts: Any, axis: int = -1) -> Tensor:
         tensors = [torch.as_tensor(part, dtype=self.dtype, device=self.device) for part in parts]
         # Torch ships this one function without types
-        return torch.stack(torch.broadcast_tensors(*tensors), axis)  # type: ignore[no-untyped-call]
+        alike = torch.broadcast_tensors(*tensors)  # type: ignore[no-untyped-call]  # Torch ships it without types
+        return torch.stack(alike, axis)
