@@ -11,6 +11,7 @@ from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.configuration import parse
 from caster_gym.tasks.episodes import Episodes
+from tests.counting import Counting
 
 TASK = parse(
     TaskSettings,
@@ -73,6 +74,19 @@ def test_every_path_gets_its_starts_and_every_agent_the_same():
     assert_array_equal(rest.first, again.first)
     assert np.any(rest.first != different.first, axis=1).all()
     assert np.any(rest.first[:3] != rest.first[3:], axis=1).all()  # starts on one path differ
+
+
+def test_agents_with_memory_are_told_which_robots_begin_an_episode():
+    """Robots leave the corridor after different times, and begin another episode while others still drive."""
+    batch, agent = evaluation_batch(TASK, TASK.test, starts=1), Counting()
+    episodes = roll_out(agent, batch, seed=4)
+    counts = np.rint(100.0 * np.array(agent.given))
+    lengths = np.isfinite(episodes.torque[..., 0]).sum(axis=0)
+    assert len(set(lengths)) == 3
+    for robot, length in enumerate(lengths):  # the action after the last one comes with the reset, and is ignored
+        expected = np.concatenate([np.arange(1, length + 2), np.arange(1, len(counts) + 1)])[: len(counts)]
+        assert_array_equal(counts[: length + 20, robot], expected[: length + 20])
+    assert_same(roll_out(agent, batch, seed=4), episodes)
 
 
 def test_a_roll_out_repeats_to_the_last_bit():

@@ -54,6 +54,14 @@ def made(settings):
     return controller_of(settings, LAYOUT, 0.02, "stiff.yaml")
 
 
+class Remembering(Springs):
+    """Has a method, or something else, that is told which robots begin an episode."""
+
+    def __init__(self, reset: Any) -> None:
+        super().__init__()
+        self.reset = reset
+
+
 def fail(*_: object) -> Any:
     raise ValueError("too stiff")
 
@@ -82,6 +90,7 @@ def test_actions_may_be_whatever_holds_the_numbers(actions):
         (Springs, "controller must return an object, got the class Springs itself: call it"),
         (Nameless(), "controller must return an object whose name, .*, is a text, got None as the name of"),
         (fail, r"controller: ValueError: too stiff \(.*test_agents_control_own_controller\.py, line \d+\)"),
+        (Remembering(3), r"controller gave <.*>: its reset must be a method that takes a mask of robots, got 3"),
     ],
 )
 def test_what_is_no_controller_is_refused_by_the_name_of_the_agent(controller, message):
@@ -106,6 +115,18 @@ def test_what_are_no_actions_is_refused_by_the_name_of_the_agent(actions, messag
     controller = made(own(Springs(actions)))
     with pytest.raises(OwnCodeError, match=rf"^agent 'stiff.yaml' \(springs:Spring\): its method act:? {message}"):
         controller.act(SEEN)
+
+
+def test_a_reset_is_passed_on_and_its_errors_are_told_by_the_name_of_the_agent():
+    told: list[np.ndarray] = []
+    mask = np.array([True, False])
+    made(own(Remembering(told.append))).reset(mask)
+    assert_array_equal(told, [mask])
+    made(own(Springs())).reset(mask)  # it has none, and needs none
+    with pytest.raises(
+        OwnCodeError, match=r"^agent 'stiff.yaml' \(springs:Spring\): its method reset: ValueError: too"
+    ):
+        made(own(Remembering(fail))).reset(mask)
 
 
 @pytest.mark.parametrize(

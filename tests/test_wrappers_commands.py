@@ -11,6 +11,7 @@ from caster_gym.configuration import ConfigurationError
 from caster_gym.shipped_files import names_of
 from caster_gym.tasks.track.environment import CasterTrackEnv, CasterTrackVectorEnv
 from caster_gym.wrappers import JointSpeeds, ResidualTorque, SensorNoise, TwistCommands, read_features, wrap
+from tests.counting import Counting
 
 PATH = {"shape": "circle", "radius": 0.5}
 ROBOTS = names_of("robots")
@@ -81,6 +82,27 @@ def test_no_correction_leaves_the_agent_alone():
         ours, our_rewards, *_ = corrected.step(nothing)
         assert_array_equal(ours, seen)
         assert_array_equal(our_rewards, rewards)
+
+
+def test_an_inner_agent_may_have_memory():
+    """It is told which robots begin an episode, alone as in a batch, and every environment has one of its own."""
+    agent = Counting()
+    residual = ResidualTorque(agent=agent)
+    env, alone = batch(residual, count=2), batch(residual, count=1)
+    env.reset(seed=1)
+    alone.reset(seed=1)
+    nothing = np.zeros((2, 6), np.float32)
+    for count in (1, 2):
+        assert_allclose(sent(env, nothing)[:, 0], [0.01 * count] * 2, rtol=1e-6)  # float32
+        assert_allclose(sent(alone, nothing[:1])[:, 0], [0.01 * count], rtol=1e-6)
+    env.reset(options={"reset_mask": np.array([False, True])})
+    assert_allclose(sent(env, nothing)[:, 0], [0.03, 0.01], rtol=1e-6)
+    assert not agent.given
+    with pytest.raises(TypeError, match=r"the feature at work 'Residual' keeps an agent with memory, <.*Counting"):
+        env.get_state()
+    agent.reset = 3  # type: ignore[assignment, method-assign]
+    with pytest.raises(ConfigurationError, match="its reset must be a method that takes a mask of robots, got 3"):
+        read_features([{"kind": "residual_torque", "agent": agent}])
 
 
 @pytest.mark.parametrize("share", [0.2, 1.5])

@@ -14,6 +14,7 @@ from caster_gym.agents.comparison.evaluation import Batch, bare, make_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.control.keyboard import KeyboardDriver, keys_of_window
 from caster_gym.agents.control.protocol import Agent
+from caster_gym.control.episodes import reset_of
 from caster_gym.envs.plan import SPAN
 from caster_gym.envs.scene import Scene
 from caster_gym.paths.naming import unknown_name
@@ -120,16 +121,20 @@ def _index(path: str | int, batch: Batch) -> int:
 
 def _scenes(agent: Agent, batch: Batch, paths: NDArray[np.int64], seed: int, once: bool) -> Iterator[list[Scene]]:
     """What there is to see, moment by moment: one episode of every robot, or one after another for ever."""
-    engine = bare(batch).engine
+    engine, reset = bare(batch).engine, reset_of(agent)
     while True:
         observations, _ = batch.reset(seed=seed, options={"path": paths})
         scenes = [engine.scene(i) for i in range(batch.num_envs)]
-        running = np.ones(batch.num_envs, dtype=np.bool_)
+        running, ended = np.ones(batch.num_envs, dtype=np.bool_), np.zeros(batch.num_envs, dtype=np.bool_)
+        reset(running.copy())
         yield scenes
         while running.any():
             observations, _, terminated, truncated, _ = batch.step(agent.act(observations))
+            if ended.any():  # this step was the reset of these robots
+                reset(ended)
+            ended = terminated | truncated
             scenes = [engine.scene(i) if running[i] else scene for i, scene in enumerate(scenes)]
-            running &= ~(terminated | truncated)
+            running &= ~ended
             yield scenes
         if once:
             return

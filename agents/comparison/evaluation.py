@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from caster_gym.agents.comparison.task_settings import Paths, TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.arrays import Array
+from caster_gym.control.episodes import reset_of
 from caster_gym.envs.plan import SPAN
 from caster_gym.tasks.environment import TaskVectorEnv
 from caster_gym.tasks.episodes import Episodes
@@ -69,7 +70,9 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
     plan, robot = plain.engine.plan, plain.robot
     path = np.arange(batch.num_envs) % len(plan.names)
     observations, _ = batch.reset(seed=seed, options={"path": path})
+    reset, ended = reset_of(agent), np.zeros(batch.num_envs, dtype=np.bool_)
     running = np.ones(batch.num_envs, dtype=np.bool_)
+    reset(running.copy())
     failed = np.zeros(batch.num_envs, dtype=np.bool_)
     limits = robot.max_torques
     driven = robot.driven_indices
@@ -77,6 +80,9 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
     while running.any():
         actions = agent.act(observations)
         observations, rewards, terminated, truncated, info = batch.step(actions)
+        if ended.any():  # this step was the reset of these robots
+            reset(ended)
+        ended = terminated | truncated
         share = info["torque"] / limits
         row = {
             "share": share,
@@ -87,7 +93,7 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
         }
         rows.append({name: np.where(_beside(running, one), one, np.nan) for name, one in row.items()})
         failed |= running & terminated
-        running &= ~(terminated | truncated)
+        running &= ~ended
     return Episodes(
         tuple(plan.names[i] for i in path),
         plain.task.control_period,

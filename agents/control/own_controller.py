@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.agents.control.protocol import Agent, ControllerSettings
+from caster_gym.arrays import Flags
+from caster_gym.control.episodes import reset_of
 from caster_gym.envs.inputs import read_actions
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.own_errors import OwnCodeError, in_own_code
@@ -44,6 +46,10 @@ def controller_of(settings: ControllerSettings, layout: ObservationLayout, perio
             f"{words} must return an object whose name, for tables and figures, is a text, got {name!r} as the name of "
             f"{controller!r}"
         )
+    try:
+        reset_of(controller)
+    except ValueError as error:
+        raise OwnCodeError(f"{words} gave {controller!r}: {error}") from error
     return _Checked(controller, name, agent, layout)
 
 
@@ -56,23 +62,27 @@ class _Checked:
 
     def __init__(self, agent: Any, name: str, described: str, layout: ObservationLayout) -> None:
         self.name = name
-        self._agent, self._driven = agent, layout.robot.driven
-        self._words = f"{described}: its method act"
+        self._agent, self._driven, self._reset = agent, layout.robot.driven, reset_of(agent)
+        self._words = f"{described}: its method"
+
+    def reset(self, mask: Flags) -> None:
+        """New episodes of some robots begin."""
+        with in_own_code(f"{self._words} reset", type(self._agent)):
+            self._reset(mask)
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (robots, driven joints) in −1 … 1 for observations (robots, size)."""
-        with in_own_code(self._words, type(self._agent)):
+        words = f"{self._words} act"
+        with in_own_code(words, type(self._agent)):
             given = self._agent.act(observations)
         shape = (len(observations), len(self._driven))
         if given is None:
-            raise OwnCodeError(f"{self._words} must return actions of shape {shape}, got None")
+            raise OwnCodeError(f"{words} must return actions of shape {shape}, got None")
         try:
             actions = read_actions(given, shape, "actions")
         except Exception as error:  # of whatever was given, such as a tensor that needs its gradient
-            raise OwnCodeError(f"{self._words} gave no usable actions: {error}") from error
+            raise OwnCodeError(f"{words} gave no usable actions: {error}") from error
         if (missing := np.isnan(actions)).any():
             robot, joint = np.argwhere(missing)[0]
-            raise OwnCodeError(
-                f"{self._words} must return numbers, got nan for {self._driven[joint]} of robot {robot + 1}"
-            )
+            raise OwnCodeError(f"{words} must return numbers, got nan for {self._driven[joint]} of robot {robot + 1}")
         return actions

@@ -15,7 +15,12 @@ from caster_gym.envs.observation import ObservationLayout
 
 
 class Agent(Protocol):
-    """Acts on what the environment shows, and on nothing else: same sensors, same preview, same limits for all."""
+    """Acts on what the environment shows, and on nothing else: same sensors, same preview, same limits for all.
+
+    An agent that remembers what it saw and did also has a method `reset(mask)`. mask (robots,) says which robots begin
+    a new episode with the next observation; all do before the first action. Robots are told apart by their place in the
+    arrays, and what an agent does for one must not depend on the others. Agents without memory need no `reset`.
+    """
 
     @property
     def name(self) -> str:

@@ -3,15 +3,18 @@
 Inner loops run at the control period, on the observation that reaches them and nothing else.
 """
 
+import copy
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from gymnasium.spaces import Box
 from pydantic import Field, field_validator
 
-from caster_gym.arrays import Array
+from caster_gym.arrays import Array, Indices
 from caster_gym.configuration import Positive
-from caster_gym.wrappers.feature import Actions, Feature, Observations, Place, Robots, Runtime
+from caster_gym.control.episodes import remembers, reset_of
+from caster_gym.states import State
+from caster_gym.wrappers.feature import Actions, Feature, Observations, Place, Quantities, Robots, Runtime
 from caster_gym.wrappers.inner_loop import InnerLoop
 from caster_gym.wrappers.twist_loop import TwistLoop
 
@@ -19,7 +22,8 @@ from caster_gym.wrappers.twist_loop import TwistLoop
 class ResidualTorque(Feature):
     """Actions correct those of another agent: what is done is clip(agent's action + share · action).
 
-    The agent is any object with `act(observations) -> actions`, both (robots, …), that remembers nothing.
+    The agent is any object with `act(observations) -> actions`, both (robots, …). One that remembers what it saw and
+    did has a method `reset(mask)`, which tells it which robots begin an episode; each environment has a copy of it.
 
     >>> import caster_gym, gymnasium
     >>> from caster_gym.wrappers import ResidualTorque, wrap
@@ -39,6 +43,7 @@ class ResidualTorque(Feature):
     def _agent_acts(cls, agent: Any) -> Any:
         if not callable(getattr(agent, "act", None)):
             raise ValueError("must be an object with a method act(observations), given in Python")
+        reset_of(agent)
         return agent
 
     def runtime(self, place: Place) -> Runtime:
@@ -108,8 +113,20 @@ class _Residual(Runtime):
     constants = frozenset({"_agent"})
 
     def __init__(self, feature: ResidualTorque, place: Place) -> None:
-        self._agent, self._share = feature.agent, feature.share
+        self._remembers = remembers(feature.agent)
+        self._agent = copy.deepcopy(feature.agent) if self._remembers else feature.agent
+        self._reset, self._share = reset_of(self._agent), feature.share
         self._seen = np.zeros((place.count, place.engine.layout.size), dtype=np.float32)
+
+    def begin(self, robots: Indices, quantities: Quantities) -> None:
+        mask = np.zeros(len(self._seen), dtype=np.bool_)
+        mask[robots] = True
+        self._reset(mask)
+
+    def get_state(self) -> State:
+        if self._remembers:
+            raise TypeError(f"{self._called} keeps an agent with memory, {self._agent!r}, whose state cannot be saved")
+        return super().get_state()
 
     def act(self, actions: Actions) -> Actions:
         given = np.asarray(self._agent.act(self._seen.copy()), dtype=np.float64)
