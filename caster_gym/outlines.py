@@ -14,6 +14,10 @@ _LEAST_TURN = 1e-9  # [rad] at a corner
 _SLACK = 1e-9  # [-] of unit normals, and of corners on faces as a share of their coordinates: rounding and more
 
 
+class OutlineError(ValueError):
+    """Corners that are no convex shape; the message goes on after "its outline"."""
+
+
 class Outline(NamedTuple):
     """One shape, as `caster_gym.mechanics.separation` measures gaps to it."""
 
@@ -30,13 +34,13 @@ class Outline(NamedTuple):
 def convex(corners: Corners) -> Outline:
     """A convex polygon listed counter-clockwise, or a line of two corners, which has a face on either side.
 
-    Raises ValueError that says which corner is wrong, and how. Anything rounder is a polygon with a radius:
+    Raises OutlineError that says which corner is wrong, and how. Anything rounder is a polygon with a radius:
     `convex(corners)._replace(radius=0.1)`.
     """
     if len(corners) < 2:
-        raise ValueError(f"the corners of an outline must be two or more, got {len(corners)}")
+        raise OutlineError(f"must have two corners or more, got {len(corners)}")
     if fault := polygon_fault(corners):
-        raise ValueError(f"the corners of an outline {fault}")
+        raise OutlineError(f"has corners that {fault}")
     faces = []
     for (x, y), (next_x, next_y) in zip(corners, corners[1:] + corners[:1], strict=True):
         length = hypot(next_x - x, next_y - y)

@@ -7,6 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from caster_gym.arena import Arena, distances, read_arena
+from caster_gym.arena.arena import Point
+from caster_gym.arena.obstacle import Obstacle
 from caster_gym.configuration import ConfigurationError, Frozen, parse
 from caster_gym.outlines import Outline, convex
 from caster_gym.robot import load_robot
@@ -125,8 +127,8 @@ STAR = [[np.cos(angle), np.sin(angle)] for angle in 4.0 * np.pi * np.arange(5) /
         ({"pilars": []}, "arena: unknown key 'pilars'; did you mean 'pillars'"),
         (
             {"obstacles": []},
-            "unknown key 'obstacles'; they stand by their kinds: 'room', 'half_planes', 'walls', 'pillars', "
-            "'polygons', 'beside'",
+            "unknown key 'obstacles'; they stand by their kinds: 'room', "
+            + ", ".join(map(repr, [name for name, value in Arena() if value == ()])),
         ),
         ("nowhere.yaml", r"there is no file 'nowhere\.yaml'"),
         ("room", "an arena is a mapping or the name of a YAML file, got 'room'"),
@@ -138,21 +140,19 @@ def test_what_is_no_arena_is_refused_by_name(arena, message):
         read_arena(arena)
 
 
-def yard(outline):
-    """An arena with one obstacle of a kind of one's own, which has this outline."""
+def yard(outline, words="at the gate"):
+    """An arena with one obstacle of a kind of one's own, which has this outline and is in this place."""
 
-    class Crate(Frozen):
+    class Crate(Obstacle):
         @property
         def outline(self):
             return outline()
 
         def __str__(self):
-            return "at the gate"
+            return words
 
     class Yard(Arena):
-        @property
-        def obstacles(self):
-            return ((f"crate 1 {Crate()}", Crate()),)
+        crates: tuple[Crate, ...] = (Crate(),)
 
     return Yard
 
@@ -162,10 +162,10 @@ def yard(outline):
     [
         (lambda: None, r"its outline must be an Outline, as convex\(\(corner, corner, …\)\) gives, got None"),
         (lambda: 0.2, "its outline must be an Outline, .* got 0.2"),
-        (lambda: convex(((0, 0), (0, 1), (1, 0))), "the corners of an outline must be listed counter-clockwise"),
+        (lambda: convex(((0, 0), (0, 1), (1, 0))), "its outline has corners that must be listed counter-clockwise"),
         (lambda: convex(((0, 0), (2, 0), (1, 0.5), (0, 2))), r"it bends inwards at corner 3 at \(1, 0\.5\) m"),
         (lambda: convex(((1, 1), (1, 1))), r"must all differ, but corner 1 at \(1, 1\) m is the same as corner 2"),
-        (lambda: convex(((1, 1),)), "the corners of an outline must be two or more, got 1"),
+        (lambda: convex(((1, 1),)), "its outline must have two corners or more, got 1"),
         (lambda: convex(((0, 0), (1, 0), (np.nan, 1))), "must be finite numbers, got corner 3 at"),
         (lambda: Outline((), ((np.nan, 0.0),), 0.1), "must have finite numbers and no negative radius"),
         (lambda: Outline((), ((0.0, 0.0),), np.nan), "must have finite numbers and no negative radius"),
@@ -185,14 +185,75 @@ def test_an_obstacle_of_ones_own_without_a_convex_outline_is_refused_by_name(out
         parse(yard(outline), {}, "arena")
 
 
-def test_an_obstacle_without_any_outline_is_refused_by_name():
-    class Yard(Arena):
-        @property
-        def obstacles(self):
-            return (("crate 1", Frozen()),)
+def attribute_missing():
+    return cast(Any, None).corner
 
-    with pytest.raises(ConfigurationError, match=r"arena: crate 1: its outline must be an Outline, .* got None"):
-        parse(Yard, {}, "arena")
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        (
+            yard(attribute_missing),
+            "crate 1 at the gate: its outline cannot be worked out: AttributeError: 'NoneType' object has no attribute "
+            r"'corner' \(.*test_arena_arena.py, line \d+\)",
+        ),
+        (
+            yard(lambda: convex(((0, 0), (0, 1))), words=None),
+            r"crate 1: its place cannot be told in words: TypeError: __str__ returned non-string .*, line \d+\)",
+        ),
+    ],
+)
+def test_what_the_code_of_an_obstacle_raises_is_told_with_its_line(kind, message):
+    with pytest.raises(ConfigurationError, match=f"arena: {message}"):
+        parse(kind, {}, "arena")
+
+
+def test_numbers_that_give_no_outline_are_told_by_the_obstacle_alone():
+    """They are no fault of the code, whose lines are not named."""
+    said = r"crate 1 at the gate: its outline has corners that must all differ, .* is the same as corner 2$"
+    with pytest.raises(ConfigurationError, match=said):
+        parse(yard(lambda: convex(((1, 1), (1, 1)))), {}, "arena")
+
+
+class Plain:
+    outline = Outline((), ((0.0, 0.0),), 0.1)
+
+
+class Flat(Obstacle):
+    height: float = 0.0
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        (tuple[Plain, ...], r"Yard\.things holds Plain, which must be a subclass of .*\.Obstacle to stand in an arena"),
+        (tuple[Frozen, ...], r"Yard\.things holds Frozen, which must be a subclass of .*\.Obstacle"),
+        (tuple[Flat, ...] | None, r"Yard\.things holds Flat, which needs a property `outline`, such as `return convex"),
+    ],
+)
+def test_fields_of_things_that_are_no_obstacles_are_refused_with_their_class(field, message):
+    with pytest.raises(TypeError, match=message):
+        type("Yard", (Arena,), {"__annotations__": {"things": field}, "things": (), "__module__": __name__})
+
+
+def test_all_fields_of_obstacles_are_in_the_way():
+    """Whatever holds them; in words, an obstacle is at its first point unless its kind says more."""
+
+    class BigCrate(Obstacle):
+        left_corner: Point
+
+        @property
+        def outline(self):
+            return Outline((), (self.left_corner,), 0.1)
+
+    class Yard(Arena):
+        crates: tuple[BigCrate, ...] = ()
+        last: BigCrate | None = None
+
+    crate = {"left_corner": [1, 2]}
+    names = [name for name, _ in parse(Yard, {**FULL, "crates": [crate, crate], "last": crate}, "arena").obstacles]
+    place = "with its left corner at (1, 2) m"
+    assert names[9:] == [f"big-crate 1 {place}", f"big-crate 2 {place}", f"big-crate 3 {place}"]
 
 
 def test_walls_of_any_thickness_are_where_they_say():

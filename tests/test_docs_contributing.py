@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -41,15 +42,14 @@ def test_the_five_caster_robot_can_be_driven(tmp_path, recwarn):
 def test_the_new_kind_of_obstacle_is_where_it_says():
     known = dict(vars(arena))
     exec(recipe("Add an obstacle kind", "python"), known)
-    barrel = known["Barrel"](start=(1.0, -1.0), end=(1.0, 1.0), radius=0.2)
+    barrel: Any = known["Barrel"]
 
     class Yard(arena.Arena):
-        @property
-        def obstacles(self):
-            return ((f"barrel 1 {barrel}", barrel),)
+        barrels: tuple[barrel, ...] = ()  # as the recipe says
 
+    yard = Yard.model_validate({"barrels": [{"start": (1.0, -1.0), "end": (1.0, 1.0), "radius": 0.2}]})
     robot = caster_gym.load_robot("chung2008")  # a disc of 0.15 m
-    gaps, _ = distances(Yard(), robot, [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [3.0, 2.0, 0.0]])
+    gaps, _ = distances(yard, robot, [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [3.0, 2.0, 0.0]])
     by_hand = np.array([1.0, 1.0, np.hypot(2.0, 1.0)]) - 0.2 - 0.15  # to the side, beyond the end, from the corner
     assert_allclose(gaps[:, 0], by_hand, rtol=1e-12)  # rounding
 

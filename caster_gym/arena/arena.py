@@ -6,11 +6,11 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, field_validator, model_validator
 
+from caster_gym.arena.obstacle import Obstacle, ObstacleFields, check_outline, point_in_words
 from caster_gym.bounded_files import expanded
 from caster_gym.configuration import ConfigurationError, Frozen, is_yaml, parse, read_yaml
 from caster_gym.mechanics.impulse import ImpactLaw
-from caster_gym.outlines import LEAST_EDGE, Outline, convex, outline_fault, polygon_fault
-from caster_gym.own_errors import in_own_code
+from caster_gym.outlines import LEAST_EDGE, Outline, convex, polygon_fault
 
 FARTHEST = 1e6  # [m] from the origin
 
@@ -22,7 +22,7 @@ Near: TypeAlias = Annotated[float, Field(ge=1e-3, le=1000.0)]
 Count: TypeAlias = Annotated[int, Field(ge=0, le=1000)]
 
 
-class HalfPlane(Frozen):
+class HalfPlane(Obstacle):
     """All that lies behind a straight line; the robot stays on the side to which the normal points."""
 
     point: Point  # [m] on the line
@@ -38,7 +38,7 @@ class HalfPlane(Frozen):
         return normal if same else (normal[0] / length, normal[1] / length)
 
     def __str__(self) -> str:
-        return f"through {_place(self.point)}"
+        return f"through {point_in_words(self.point)}"
 
     @property
     def outline(self) -> Outline:
@@ -47,7 +47,7 @@ class HalfPlane(Frozen):
         return Outline(((nx, ny, nx * x + ny * y),), (), 0.0)
 
 
-class Wall(Frozen):
+class Wall(Obstacle):
     """A straight wall with flat ends; its thickness lies half on either side of the line from start to end."""
 
     start: Point  # [m]
@@ -57,11 +57,12 @@ class Wall(Frozen):
     @model_validator(mode="after")
     def _has_a_length(self) -> Self:
         if abs(complex(*self.end) - complex(*self.start)) < LEAST_EDGE:
-            raise ValueError(f"'start' and 'end' must differ, got {_place(self.start)} and {_place(self.end)}")
+            start, end = point_in_words(self.start), point_in_words(self.end)
+            raise ValueError(f"'start' and 'end' must differ, got {start} and {end}")
         return self
 
     def __str__(self) -> str:
-        return f"from {_place(self.start)} to {_place(self.end)}"
+        return f"from {point_in_words(self.start)} to {point_in_words(self.end)}"
 
     @property
     def outline(self) -> Outline:
@@ -72,14 +73,14 @@ class Wall(Frozen):
         return convex(tuple((corner.real, corner.imag) for corner in corners))
 
 
-class Pillar(Frozen):
+class Pillar(Obstacle):
     """A round pillar."""
 
     centre: Point  # [m]
     radius: Size = 0.1  # [m]
 
     def __str__(self) -> str:
-        return f"at {_place(self.centre)}"
+        return f"at {point_in_words(self.centre)}"
 
     @property
     def outline(self) -> Outline:
@@ -87,7 +88,7 @@ class Pillar(Frozen):
         return Outline((), (self.centre,), self.radius)
 
 
-class Polygon(Frozen):
+class Polygon(Obstacle):
     """A convex polygon."""
 
     corners: Annotated[tuple[Point, ...], Field(min_length=3, max_length=100)]  # [m] counter-clockwise
@@ -100,15 +101,12 @@ class Polygon(Frozen):
         return corners
 
     def __str__(self) -> str:
-        return f"with its first corner at {_place(self.corners[0])}"
+        return f"with its first corner at {point_in_words(self.corners[0])}"
 
     @property
     def outline(self) -> Outline:
         """As many faces as corners."""
         return convex(self.corners)
-
-
-Obstacle: TypeAlias = HalfPlane | Wall | Pillar | Polygon
 
 
 class Beside(Frozen):
@@ -131,7 +129,7 @@ class Beside(Frozen):
         return span
 
 
-class Arena(Frozen):
+class Arena(ObstacleFields):
     """What is in the way, and how the robot bounces off it.
 
     >>> import caster_gym, gymnasium
@@ -171,10 +169,7 @@ class Arena(Frozen):
     @model_validator(mode="after")
     def _obstacles_have_outlines(self) -> Self:
         for name, obstacle in self.obstacles:
-            with in_own_code(f"{name}: its outline cannot be worked out", type(obstacle)):
-                fault = outline_fault(getattr(obstacle, "outline", None))
-            if fault:
-                raise ValueError(f"{name}: its outline {fault}")
+            check_outline(name, obstacle)
         return self
 
     @property
@@ -190,14 +185,7 @@ class Arena(Frozen):
     def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
         """Every obstacle that has a place, behind its name: kind, number and where it is."""
         ends = zip(("x_min", "y_min", "x_max", "y_max"), self.sides, strict=False)
-        kinds: dict[str, tuple[Obstacle, ...]] = {
-            "half-plane": self.half_planes,
-            "wall": self.walls,
-            "pillar": self.pillars,
-            "polygon": self.polygons,
-        }
-        numbered = ((f"{kind} {i} {one}", one) for kind, them in kinds.items() for i, one in enumerate(them, start=1))
-        return (*((f"the room's side {end}", side) for end, side in ends), *numbered)
+        return (*((f"the room's side {end}", side) for end, side in ends), *self.numbered)
 
 
 _KINDS = [name for name, field in Arena.model_fields.items() if field.default in (None, ())]
@@ -219,7 +207,3 @@ def read_arena(arena: str | Path | Mapping[str, Any] | Arena | None) -> Arena:
         path = expanded(arena)
         return parse(Arena, read_yaml(path), f"{path}: arena")
     raise ConfigurationError(f"an arena is a mapping or the name of a YAML file, got {arena!r}")
-
-
-def _place(point: tuple[float, float]) -> str:
-    return f"({point[0]:.4g}, {point[1]:.4g}) m"
