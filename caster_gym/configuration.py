@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sized
 from pathlib import Path
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, TypeVar, Union, get_args, get_origin
@@ -144,8 +144,27 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _listed(places: list[str]) -> str:
-    more = len(places) - MOST_PROBLEMS
-    return ", ".join(places[:MOST_PROBLEMS]) + (f" and {more} more" if more > 0 else "")
+    """Places where the same is wrong; the same place of several items of a list is told once: casters 1 to 5."""
+    grouped: dict[tuple[str, str], list[int]] = {}
+    for place in places:
+        head, number, tail = _NUMBERED.split(place, maxsplit=1) if _NUMBERED.search(place) else (place, "", "")
+        grouped.setdefault((head, tail), []).extend([int(number)] if number else [])
+    told = [
+        f"{head}{'s' if len(numbers) > 1 else ''}{f' {_numbers(numbers)}' if numbers else ''}{tail}"
+        for (head, tail), numbers in grouped.items()
+    ]
+    more = len(told) - MOST_PROBLEMS
+    return ", ".join(told[:MOST_PROBLEMS]) + (f" and {more} more" if more > 0 else "")
+
+
+_NUMBERED = re.compile(r"(?<=[a-z]) (\d+)(?=: )")  # of an item that is called by its kind
+
+
+def _numbers(numbers: list[int]) -> str:
+    """1; 1 and 3; 1 to 5: numbers that rise."""
+    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
+        return f"{numbers[0]} to {numbers[-1]}"
+    return " and ".join([", ".join(map(str, numbers[:-1])), str(numbers[-1])] if numbers[1:] else map(str, numbers))
 
 
 def did_you_mean(name: object, known: Iterable[str], usual: Mapping[str, str] = MappingProxyType({})) -> str:
@@ -191,6 +210,9 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         models = [one for one in place.members if _is_model(one)]
         return f"{place.around}unknown key {brief('.'.join((*place.keys, key)))}", f"; {_advice(key, models)}", ""
     where = str(_place(model, location))
+    if kind == "missing" and isinstance(problem["input"], Sized) and isinstance(location[-1], int):  # of a short list
+        place = _place(model, location[:-1])
+        return str(place), f" should have {_lengths(place)} items, got {len(problem['input'])}", ""
     if kind == "missing":
         return where, " is missing", ""
     if kind == "union_tag_invalid":
@@ -201,8 +223,11 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
         return where, f": {details['discriminator']} is missing", ""
     if kind in ("too_short", "too_long") and "actual_length" in details:
         bound = f"at least {details['min_length']}" if kind == "too_short" else f"at most {details['max_length']}"
+        bound = _lengths(_place(model, location)) or bound
         items = "item" if bound.endswith(" 1") else "items"
-        return where, f" should have {bound} {items}, got {details['actual_length']}", ""
+        count = details["actual_length"]
+        comma = "; decimals have a point, as 0.03" if kind == "too_long" and count == 2 * details["max_length"] else ""
+        return where, f" should have {bound} {items}, got {count}{comma}", ""
     message = _PLAIN.get(kind, re.sub(r"^(Value error, |\w+ (?=should))", "", problem["msg"]))
     complete = (
         not location
@@ -212,7 +237,26 @@ def _complaint(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str,
     )
     message = cut(message, _LONGEST_MESSAGE)
     joint = " " if message.startswith(("should", "must", "needs")) else ": "
-    return where, f"{joint if where else ''}{message}", "" if complete else f", got {brief(problem['input'])}"
+    got = f", got {brief(problem['input'])}{_with_a_point(problem['input']) if 'a number' in message else ''}"
+    return where, f"{joint if where else ''}{message}", "" if complete else got
+
+
+def _with_a_point(value: Any) -> str:
+    """What to write instead of a number with a decimal comma."""
+    if not (isinstance(value, str) and (found := _DECIMAL_COMMA.fullmatch(value.strip()))):
+        return ""
+    whole, decimals = found.groups()
+    thousands = f" or {whole}{decimals}" if len(decimals) == 3 and whole.lstrip("+-0") else ""
+    return f": write {whole}.{decimals}{thousands}"
+
+
+_DECIMAL_COMMA = re.compile(r"([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)")
+
+
+def _lengths(place: "_Place") -> str:
+    """How many items a list there has, "2" or "2 or 3"; empty if it may have any number of them."""
+    kinds = [get_args(one) for one in place.members if get_origin(one) is tuple]
+    return " or ".join(sorted({str(len(one)) for one in kinds})) if all(Ellipsis not in one for one in kinds) else ""
 
 
 _PLAIN = {  # for what pydantic says in terms of Python
@@ -259,7 +303,8 @@ def _item(place: _Place, number: int) -> _Place:
     name = ".".join(place.keys)
     nouns = {re.sub(r"(?<=[a-z])(?=[A-Z])", "-", one.__name__).lower() for one in members if _is_model(one)}
     if not place.keys:
-        around = f"number {number} of {place.around}"  # a list in a list
+        *outer, inner = place.around.removesuffix(": ").rsplit(": ", 1)  # a list in a list
+        around = f"{': '.join([*outer, f'number {number} of {inner}'])}: "
     elif {place.keys[-1]} == {f"{noun.replace('-', '_')}s" for noun in nouns}:
         above = "".join(f"{key}: " for key in place.keys[:-1])
         around = f"{place.around}{above}{nouns.pop()} {number}: "

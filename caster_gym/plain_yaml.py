@@ -70,13 +70,15 @@ class _Open:
         self.value: dict[str, Any] | list[Any] = {} if isinstance(start, yaml.MappingStartEvent) else []
         self.key: Any = _NONE  # of a mapping, while its value is awaited
         self.merged: list[dict[str, Any]] = []
+        self._last: Any = None  # event of the last item, key or value
 
     def add(self, value: Any, event: Any) -> None:
         """Take the next item, or the next key or value."""
+        before, self._last = self._last, event
         if isinstance(self.value, list):
             self.value.append(value)
         elif self.key is _NONE:
-            self.key = self._checked_key(value, event)
+            self.key = self._checked_key(value, event, before)
         elif self.key is _MERGE:
             self.merged += self._checked_merge(value, event)
             self.key = _NONE
@@ -84,11 +86,14 @@ class _Open:
             self.value[self.key] = value
             self.key = _NONE
 
-    def _checked_key(self, key: Any, event: Any) -> Any:
+    def _checked_key(self, key: Any, event: Any, before: Any) -> Any:
         if key == "<<" and event.implicit[0] and not self.merged:
             return _MERGE
         if not isinstance(key, str):
-            raise _fault(f"a key must be text, got {_kind(key)}", event)
+            number = _split_number(before, event)
+            raise _fault(
+                f"decimals have a point: write {number}" if number else f"a key must be text, got {_kind(key)}", event
+            )
         if key in self.value:
             raise _fault(f"the key {brief(key)} stands twice", event)
         return key
@@ -187,6 +192,15 @@ def _number(text: str, event: Any) -> int | float | str:
         return float(plain)
     base, digits = next((base, digits) for base, digits in zip((2, 16, 8), other.groups()[1:], strict=True) if digits)
     return int(other[1] + (digits.replace("_", "") or "0"), base)
+
+
+def _split_number(before: Any, after: Any) -> str:
+    """The number, with a point, of which a decimal comma within { } has made a value and a key; empty if it has not."""
+    plain = isinstance(before, yaml.ScalarEvent) and isinstance(after, yaml.ScalarEvent)
+    if not plain or after.start_mark.index != before.end_mark.index + 1:
+        return ""
+    number = f"{before.value}.{after.value}"
+    return number if re.fullmatch(r"[-+]?\d+\.\d+(?:[eE][-+]?\d+)?", number) else ""
 
 
 def _check_tag(value: Any, event: Any) -> None:

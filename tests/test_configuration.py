@@ -178,14 +178,26 @@ def test_all_errors_are_told_at_once(tmp_path):
     [
         ({"walls": [{}, {"length": -1}]}, "wall 2: 'length' should be greater than 0, got -1"),
         ({"walls": [{"ends": [0, "b"]}]}, "wall 1: number 2 of 'ends' should be a number, got 'b'"),
-        ({"walls": [{"ends": [0]}]}, "wall 1: number 2 of 'ends' is missing"),
-        ({"walls": [{"ends": [0, 1, 2]}]}, "wall 1: 'ends' should have at most 2 items, got 3"),
+        ({"walls": [{"ends": [0]}]}, "wall 1: 'ends' should have 2 items, got 1"),
+        ({"walls": [{"ends": [0, 1, 2]}]}, "wall 1: 'ends' should have 2 items, got 3"),
+        (
+            {"walls": [{"ends": [0, 1, 0, 3]}]},
+            "wall 1: 'ends' should have 2 items, got 4; decimals have a point, as 0.03",
+        ),
+        ({"walls": [{"ends": [0]}] * 2}, "walls 1 and 2: 'ends' should have 2 items, got 1"),
+        (
+            {"walls": [{"ends": [0]}] * 3 + [{}, {"ends": [0]}]},
+            "walls 1, 2, 3 and 5: 'ends' should have 2 items, got 1",
+        ),
+        ({"walls": [{"length": 0}] * 200}, "walls 1 to 200: 'length' should be greater than 0, got 0"),
         ({"walls": []}, "'walls' should have at least 1 item, got 0"),
         ({"walls": [3]}, "wall 1 should be a mapping of keys to values, got 3"),
         ({"walls": 3}, "'walls' should be a list, got 3"),
         ({"things": [{"kind": "wall"}, {"kind": "pillar", "radius": 0}]}, "number 2 of 'things': 'radius' should be"),
         ({"grid": [[1], [1, -1]]}, "number 2 of number 2 of 'grid' should be greater than 0, got -1"),
         ({"weights": {"speed": "high"}}, "'weights.speed' should be a number, got 'high'"),
+        ({"weights": {"speed": "0,03"}}, "'weights.speed' should be a number, got '0,03': write 0.03"),
+        ({"weights": {"speed": "-1,250"}}, "'weights.speed' should be a number, got '-1,250': write -1.250 or -1250"),
         ({"count": 1.5}, "'count' should be a whole number, got 1.5"),
     ],
 )

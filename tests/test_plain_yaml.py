@@ -62,6 +62,10 @@ def test_dates_and_times_stay_text_and_nan_is_a_number():
     [
         ("a: 1\nb: 2\na: 3", "the key 'a' stands twice at line 3, column 1"),
         ("1: 2", "a key must be text, got 1"),
+        ("{trail: 0,03, radius: 1}", "decimals have a point: write 0.03 at line 1, column 11"),
+        ("{x: -2,5e-3}", "decimals have a point: write -2.5e-3"),
+        ("{x: 0, 3: y}", "a key must be text, got 3"),
+        ("{x: y,3}", "a key must be text, got 3"),
         ("[a]: 2", "a key must be text, got a list"),
         ("~: 2", "a key must be text, got nothing"),
         ("a: !!python/object/apply:os.getcwd []", "the tag .*os.getcwd' is not read: files hold data alone"),

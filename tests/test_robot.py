@@ -70,7 +70,7 @@ REFUSED = {
     ),
     "gear of three columns": (
         lambda r: r["casters"][0].update(gear=[[1, 0, 0], [0, 1, 0]]),
-        ["caster 1: number 1 of 'gear'", "at most 2 items, got 3"],
+        ["caster 1: number 1 of 'gear'", "should have 2 items, got 3"],
     ),
     "yes for a number": (lambda r: r["platform"].update(mass=True), ["'platform.mass' should be a number, got True"]),
     "a number in quotes": (lambda r: r["platform"].update(mass="5"), ["'platform.mass' should be a number, got '5'"]),
