@@ -74,7 +74,7 @@ def compiled(function: Callable[..., Any], describe: Describe | None = None) -> 
 
     describe: tells what is compiled, from the types of the arguments. None for what only compiled code calls.
     """
-    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
     share(dispatcher, function, describe)
     return dispatcher
 

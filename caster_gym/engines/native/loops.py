@@ -11,7 +11,9 @@ from numba.extending import overload
 
 from caster_gym.mechanics import scalars
 
-INLINE: Any = {"forceinline": True}  # Numba names the type of its options in stubs only
+# Numba names the type of its options in stubs only. Nobody calls an inlined function through a pointer for C: without
+# one, a sixth of the time of compiling is saved.
+INLINE: Any = {"forceinline": True, "no_cfunc_wrapper": True}
 
 
 @overload(scalars.add, jit_options=INLINE, strict=False)
