@@ -16,7 +16,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
 from caster_gym.engines.native.compilation import Describe, share
-from caster_gym.engines.native.loops import INLINE
+from caster_gym.engines.native.loops import COMPILED, INLINE
 from caster_gym.mechanics import (
     actuation,
     caster,
@@ -74,7 +74,7 @@ def compiled(function: Callable[..., Any], describe: Describe | None = None) -> 
 
     describe: tells what is compiled, from the types of the arguments. None for what only compiled code calls.
     """
-    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True, **COMPILED)(function)
     share(dispatcher, function, describe)
     return dispatcher
 
