@@ -8,30 +8,29 @@ longer than a window lasts, even where casters flip. All windows are one batch.
     path       states predicted, after each of k simulator's steps between samples       (W, 1 + k (S − 1), 6 + N)
 
 Where the recording has the wheels' angles, these are N more components of a state, and their rates are integrated.
-The derivatives are those of the simulator's steps, by forward differentiation with Torch, chained along each window.
+The derivatives are those of the simulator's steps, see `caster_gym.PeriodDerivatives`, chained along each window.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-import torch
 
 from caster_gym.analysis.frames import wrap_angle
 from caster_gym.arrays import Array
+from caster_gym.engines.native.derivatives import PeriodDerivatives
 from caster_gym.engines.numpy_model import Model
-from caster_gym.engines.tensor.model import TorchModel
 from caster_gym.identification.acting import acting_torque, acts, shown_errors
 from caster_gym.identification.recording import FINER, Recording, substeps_of
 from caster_gym.identification.rolling import rolled_along
 from caster_gym.identification.unknowns import PARAMETERS, kind_of, parameters_with
-from caster_gym.mechanics.parameters import Dynamics, RobotParameters
+from caster_gym.mechanics.parameters import Dynamics, RobotParameters, pack_parameters, parameter_names
 from caster_gym.robot import Robot
 
 _SMOOTHING = 7  # samples over which velocities are first guessed from poses
 _ASIDE = 1e-6  # [-] of a value, or in its unit, by which it is changed for a difference
-_TOGETHER = 30_000  # numbers in one tensor: more, and Torch would wake its threads, which wait for busy neighbours
+_TOGETHER = 4096  # steps that are differentiated at once, so that the derivatives by directions take a few MB
 
 
 class Shooting:
@@ -189,50 +188,23 @@ class Shooting:
 
     def _step_derivatives(self, states: Array, values: Array) -> Array:
         """Derivatives (W, k (S − 1), 6 + N, 6 + N + P + K) of each step's end with respect to its start and values."""
-        width, own = states.shape[-1], len(self.names)
-        joints = 2 * self.robot.caster_count
-        pushed = self._torque_slopes(values)  # (W, k (S − 1), 2 N, P + K)
-        seen = joints if pushed is not None else 0
-        seeds = torch.eye(width + own + seen, dtype=torch.float64)
-        flat = torch.as_tensor(states.reshape(-1, width))
-        torques = torch.as_tensor(self._pushed_torque(values).reshape(-1, joints))
-        lanes = max(1, _TOGETHER // len(seeds))
-        parts = [
-            self._tangents(state, torque, torch.as_tensor(values), seeds)
-            for state, torque in zip(torch.split(flat, lanes), torch.split(torques, lanes), strict=True)
-        ]
-        slopes: Array = torch.cat(parts, dim=1).permute(1, 2, 0).numpy().reshape(*states.shape, len(seeds))
-        if pushed is None:
-            return slopes
-        whole = np.concatenate([slopes[..., : width + own], np.zeros((*states.shape, len(values) - own))], axis=-1)
-        whole[..., width:] += slopes[..., width + own :] @ pushed
-        return whole
-
-    def _tangents(
-        self, state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor, seeds: torch.Tensor
-    ) -> torch.Tensor:
-        """How one step's ends (L, 6 + N) change along each of some directions of state, values and torque, one a seed.
-
-        Seeds (…, 6 + N + P), or (…, 6 + N + P + 2 N) where torques change too.
-        """
-        width, joints = state.shape[1], torque.shape[1]
-
-        def end(state: torch.Tensor, torque: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-            model = TorchModel(self.robot, parameters=self.parameters(values))
-            both: Any = model.simulate(cast(Any, state), cast(Any, torque), self._step, 1)
-            return cast(torch.Tensor, both[1])
-
-        own = values[: len(self.names)]
-        places = [width, len(own), seeds.shape[1] - width - len(own)]
-
-        def along(seed: torch.Tensor) -> torch.Tensor:
-            of_state, of_values, of_torque = torch.split(seed, places)
-            if not len(of_torque):
-                of_torque = torch.zeros(joints, dtype=torch.float64)
-            tangents = (of_state.expand_as(state), of_torque.expand_as(torque), of_values)
-            return cast(torch.Tensor, torch.func.jvp(end, (state, torque, own), tangents)[1])
-
-        return torch.vmap(along)(seeds)
+        width, pushed = states.shape[-1], self._torque_slopes(values)
+        of_numbers = self._slopes_of(lambda moved: np.array(pack_parameters(self.parameters(moved)), float), values)
+        told: Array = np.any(of_numbers != 0.0, axis=1)
+        told[0] = True  # without any, other code would be compiled
+        by = [name for name, one in zip(parameter_names(self.robot.caster_count), told, strict=True) if one]
+        numbers = self.parameters(values)
+        steps = PeriodDerivatives(self.robot, self._step, by=by, parameters=numbers, checked=True)
+        flat, slopes = states.reshape(-1, width), np.empty((states[..., 0].size, width, width + len(values)))
+        torques = self._pushed_torque(values).reshape(len(flat), -1)
+        for few in np.split(np.arange(len(flat)), range(_TOGETHER, len(flat), _TOGETHER)):
+            end = steps.at(_with_directions(flat[few]), torques[few])
+            slopes[few, :, :width] = _by_angles(_of_angles(end.by_state, end.state), flat[few])
+            slopes[few, :, width:] = _of_angles(end.by_parameters, end.state) @ of_numbers[told]
+            if pushed is not None:
+                by_torque = _of_angles(end.by_torque, end.state)
+                slopes[few, :, width:] += by_torque @ pushed.reshape(len(flat), -1, len(values))[few]
+        return slopes.reshape(*states.shape, -1)
 
     def _torque_slopes(self, values: Array) -> Array | None:
         """Derivatives (W, k (S − 1), 2 N, P + K) of the torques with respect to the values; none if they are fixed."""
@@ -262,7 +234,7 @@ class Shooting:
     def _named(self, values: Array) -> dict[str, float]:
         return {**self.known, **{name: float(values[i]) for i, name in enumerate(self.names)}}
 
-    def parameters(self, values: Array | torch.Tensor) -> RobotParameters:
+    def parameters(self, values: Array) -> RobotParameters:
         """The numbers of the robot with values (P,) of the unknowns, and what comes behind these left out."""
         named = {**self.known, **{name: values[i] for i, name in enumerate(self.names)}}
         replaced = {name: value for name, value in named.items() if kind_of(name) in PARAMETERS}
@@ -280,3 +252,26 @@ def _twist_from(recording: Recording) -> Array:
     rates = savgol_filter(pose, _SMOOTHING, 2, deriv=1, delta=recording.time_step, axis=0)
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     return np.column_stack([c * rates[:, 0] + s * rates[:, 1], c * rates[:, 1] - s * rates[:, 0], rates[:, 2]])
+
+
+def _with_directions(states: Array) -> Array:
+    """States (L, 7 + 2 N) with directions in place of angles (L, 6 + N)."""
+    casters = np.stack([np.cos(states[:, 6:]), np.sin(states[:, 6:])], axis=-1).reshape(len(states), -1)
+    heading = np.column_stack([np.cos(states[:, 2]), np.sin(states[:, 2])])
+    return np.concatenate([states[:, :2], heading, states[:, 3:6], casters], axis=1)
+
+
+def _of_angles(slopes: Array, states: Array) -> Array:
+    """Derivatives (L, 6 + N, …) of states with angles, from those (L, 7 + 2 N, …) with directions: dφ = c ds − s dc."""
+    c, s = states[:, [2, *range(7, states.shape[1], 2)]], states[:, [3, *range(8, states.shape[1], 2)]]
+    turns = c[..., None] * slopes[:, [3, *range(8, states.shape[1], 2)]]
+    turns -= s[..., None] * slopes[:, [2, *range(7, states.shape[1], 2)]]
+    return np.concatenate([slopes[:, :2], turns[:, :1], slopes[:, 4:7], turns[:, 1:]], axis=1)
+
+
+def _by_angles(slopes: Array, states: Array) -> Array:
+    """Derivatives (L, …, 6 + N) by states with angles, from those (L, …, 7 + 2 N) by directions."""
+    angles = states[:, None, [2, *range(6, states.shape[1])]]
+    cos, sin = slopes[..., [2, *range(7, slopes.shape[-1], 2)]], slopes[..., [3, *range(8, slopes.shape[-1], 2)]]
+    turns = np.cos(angles) * sin - np.sin(angles) * cos
+    return np.concatenate([slopes[..., :2], turns[..., :1], slopes[..., 4:7], turns[..., 1:]], axis=-1)

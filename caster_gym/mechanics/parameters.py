@@ -158,6 +158,13 @@ def pack_parameters(robot: RobotParameters) -> tuple[Scalar, ...]:
     return flat
 
 
+def parameter_names(casters: int) -> tuple[str, ...]:
+    """What the numbers of such a row are called: `mass`, …, `x_1`, …, with the number of the caster."""
+    return PlatformParameters._fields + tuple(
+        f"{field}_{number}" for number in range(1, casters + 1) for field in CasterParameters._fields
+    )
+
+
 def unpack_parameters(flat: tuple[Scalar, ...]) -> RobotParameters:
     """Inverse of `pack_parameters`; columns of a table make a robot of arrays."""
     casters = flat[PLATFORM_FIELDS:]
