@@ -50,7 +50,7 @@ def test_a_wrench_of_another_shape_is_refused():
 
 PAIR = load_robot("chung2008")
 PAIR = PAIR.model_copy(update={"casters": PAIR.casters[:2], "actuation": "all"})
-SMALL: dict[str, Any] = {"robot": PAIR, "preview": (0.1,), "control_period": 0.01, "substeps": 2}  # to compile
+SMALL: dict[str, Any] = {"robot": PAIR, "preview": (0.1,), "control_period": 0.005, "substeps": 1}  # to compile
 
 
 @pytest.mark.slow
