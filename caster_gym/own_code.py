@@ -8,10 +8,11 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any, NamedTuple
 
 from caster_gym.configuration import ConfigurationError, did_you_mean
-from caster_gym.own_errors import place_of
+from caster_gym.own_errors import in_words
 
 RESULTS = ("policy.yaml", "run.yaml")  # files that mark a folder as that of a policy or of a run
 
@@ -41,7 +42,7 @@ class OwnCode(NamedTuple):
             )
         places = [str(place) for place in (folder, Path.cwd()) if place is not None]
         sys.path += [place for place in dict.fromkeys(places) if place not in sys.path]
-        contents = vars(_imported(module, folder))
+        contents = vars(import_own(module, folder))
         known = [one for one, thing in contents.items() if self.fits(thing)]
         if name not in contents:
             advice = did_you_mean(name, known) if known else self.nothing
@@ -52,7 +53,8 @@ class OwnCode(NamedTuple):
         return contents[name]
 
 
-def _imported(name: str, folder: Path | None) -> Any:
+def import_own(name: str, folder: Path | None = None) -> Any:
+    """A module of a user. Raises ConfigurationError that says why it cannot be imported."""
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
@@ -63,6 +65,7 @@ def _imported(name: str, folder: Path | None) -> Any:
             f"there is no module {error.name!r} in {beside}the working folder or among the installed packages"
         ) from error
     except Exception as error:  # whatever the code of others does
-        raise ConfigurationError(
-            f"module {name!r} cannot be imported: {type(error).__name__}: {error} ({place_of(error)})"
-        ) from error
+        lines = [line.filename for line in extract_tb(error.__traceback__) if line.name == "<module>"]
+        own = [file for file in lines if not Path(file).is_relative_to(Path(__file__).parent)]
+        words = in_words(error, own[-1] if own else None)
+        raise ConfigurationError(f"module {name!r} cannot be imported: {words}") from error

@@ -21,11 +21,19 @@ def in_own_code(what: str, kind: type) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # whatever the code of others does
-        raise OwnCodeError(f"{what}: {type(error).__name__}: {error} ({place_of(error, file)})") from error
+        raise OwnCodeError(f"{what}: {in_words(error, file)}") from error
+
+
+def in_words(error: Exception, file: str | None = None, advice: str = "") -> str:
+    """Kind, message, file and line of an error; see `place_of`."""
+    message = error.msg if isinstance(error, SyntaxError) else error  # whose text has the place in it too
+    return f"{type(error).__name__}: {message}{advice} ({place_of(error, file)})"
 
 
 def place_of(error: Exception, file: str | None = None) -> str:
-    """The file and the line of an error: the last one in this file, if any is in it."""
+    """The file and the line of an error: the last one in this file, if any is in it; of a syntax error, its own."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}, line {error.lineno}"
     lines = traceback.extract_tb(error.__traceback__)
     last = [*lines, *(line for line in lines if line.filename == file)][-1]
     return f"{last.filename}, line {last.lineno}"

@@ -19,6 +19,7 @@ from caster_gym.agents.learning.training import train
 from caster_gym.agents.registry import read_agent
 from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.envs.tensor.vector_env import TorchVectorEnv
+from caster_gym.own_errors import OwnCodeError
 
 SEED, COUNT, LONGEST = 5, 3, 3
 QUICK: dict[str, Any] = {
@@ -85,6 +86,23 @@ def test_failure_is_no_time_out():
         *_, dones, extras = environment.step(torch.zeros(COUNT, 6))
     assert dones.tolist() == [1, 0, 1]
     assert extras["time_outs"].tolist() == [True, False, True]
+
+
+def test_rewards_that_are_not_finite_are_told_after_the_round():
+    environment = RslVecEnv(batch(), SEED)
+    step = environment.batch.step
+
+    def spoilt(actions):
+        observations, rewards, terminated, truncated, infos = step(actions)
+        term, values = next(iter(infos["reward_terms"].items()))
+        infos["reward_terms"][term] = values * torch.nan
+        return observations, rewards * torch.nan, terminated, truncated, infos
+
+    environment.check_rewards()
+    environment.batch.step = spoilt  # type: ignore[method-assign]
+    environment.step(torch.zeros(COUNT, 6))
+    with pytest.raises(OwnCodeError, match=r"the reward term 'position' of task 'track' .* was nan in a step"):
+        environment.check_rewards()
 
 
 def test_episodes_cannot_be_given_other_lengths():

@@ -6,10 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from numba import typeof
+from numba import njit, typeof
 
 from caster_gym import load_robot
 from caster_gym.envs.native import compilation
+from caster_gym.own_errors import OwnCodeError
 from caster_gym.tasks.building import build_engine
 from caster_gym.tasks.registry import find_task
 
@@ -21,6 +22,22 @@ FAR = {"room": [[-50.0, -50.0], [50.0, 50.0]]}
 def types_of_restart(engine):
     """Types of the arguments that matter, where they stand."""
     return (None, None, typeof(engine._world), None, None, None, typeof(engine._sizes))
+
+
+SCALES = {"a": 1.0}
+
+
+def scaled(x):
+    return SCALES["a"] * x
+
+
+def test_what_cannot_be_compiled_is_told_by_its_innermost_reason_and_line():
+    """Numba itself tells it in dozens of lines, once for each function on the way."""
+    engine, _ = build_engine(TRACK, "chung2008", "circle", None, None, {}, 1)
+    inner = njit(scaled)
+    said = r"^the code of CasterTrack cannot be compiled: .*SCALES.* \(.*test_envs_native_compilation\.py, line \d+\)$"
+    with pytest.raises(OwnCodeError, match=said), compilation.told_plainly(engine.plan.source):
+        njit(lambda x: inner(x))(1.0)
 
 
 @pytest.mark.parametrize(

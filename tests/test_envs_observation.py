@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from caster_gym import load_robot
 from caster_gym.envs.observation import (
     CHANNELS,
     GAP_UNIT,
@@ -79,3 +80,13 @@ def test_a_channel_that_would_shift_the_others_is_refused(channels, sentence):
     """Its values are counted on a robot that has of nothing one, and of nothing as many as of another thing."""
     with pytest.raises(TypeError, match=sentence):
         check_channels(tuple(channels))
+
+
+def test_parts_and_units_that_there_are_not_are_told_with_those_that_there_are():
+    layout = ObservationLayout(load_robot("chung2008"), (0.1,))
+    with pytest.raises(
+        ValueError, match=r"no part 'twists'; its parts are position_error, .*directions, .*preview_0.1s$"
+    ):
+        layout.physical(np.zeros(layout.size), "twists")
+    with pytest.raises(ValueError, match="the unit of previews must be 's' or 'm', got 'ms'"):
+        ObservationLayout(load_robot("chung2008"), (0.1,), "ms")  # type: ignore[arg-type]

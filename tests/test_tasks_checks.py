@@ -4,7 +4,9 @@ import dataclasses
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
+import torch
 
 from caster_gym.engines.native.compilation import compilations
 from caster_gym.envs.report import Endings
@@ -97,6 +99,26 @@ WRONG: dict[str, dict[str, Any]] = {
     r"and `max` take one for all: write where, minimum, .* \(.*test_tasks_checks\.py, line \d+\)": {"reward": lowest},
     r"conditions differ from robot to robot, .*\.py, line \d+\)$": {"reward": branching},
     r"the endings of task 'mine': TypeError: conditions differ": {"endings": branching},
+    r"the reward of task 'mine': TypeError: numbers differ from robot to robot, and functions of Python, `math` and "
+    r"NumPy take one for all: calculate with .*, or write where, .* \(.*test_tasks_checks\.py, line \d+\)": {
+        "reward": lambda moment, weights: Terms(math.exp(moment.errors.ahead), 0.0)
+    },
+    r"the reward of task 'mine': TypeError: numbers differ .* \(.*test_tasks_checks\.py, line \d+\)$": {
+        "reward": lambda moment, weights: Terms(np.clip(moment.errors.ahead, 0.0, 1.0), 0.0)
+    },
+    r"the reward of task 'mine': TypeError: .*ufunc.*: write where, .* \(.*test_tasks_checks\.py, line \d+\)": {
+        "reward": lambda moment, weights: Terms(np.exp(moment.errors.ahead), 0.0)
+    },
+    r"the reward of task 'mine': TypeError: .* not _Tried: write where, .* \(.*test_tasks_checks\.py, line \d+\)": {
+        "reward": lambda moment, weights: Terms(torch.exp(moment.errors.ahead), 0.0)  # type: ignore[arg-type]
+    },
+    r"the reward of task 'mine' must give a finite number as 'power', and gives nan for a robot that moves beside its "
+    r"reference \(.*test_tasks_checks\.py, line \d+\)": {"reward": lambda moment, weights: Terms(0.0, math.nan)},
+    r"the reward of task 'mine' must give a finite number as 'near', and gives inf for a robot at rest on its "
+    r"reference, without obstacles \(": {"reward": lambda moment, weights: Terms(moment.situation.clearance, 0.0)},
+    r"the reward of task 'mine': ZeroDivisionError: .*, as at all other moments that were tried \(.*, line \d+\)": {
+        "reward": lambda moment, weights: Terms(1.0 / (weights.effort_weight - 0.02), 0.0)
+    },
     r"task 'mine': each field of Unknown must be a number of TrackParameters, and 'power_weight' is none there": {
         "weights": Unknown
     },
@@ -132,10 +154,10 @@ def test_a_reward_may_do_all_that_scalars_can():
     check_reward(task, weights_of(task))
 
 
-@pytest.mark.parametrize("number", [lambda weights: 1.0 / (weights.effort_weight - 0.02), lambda _: math.sqrt(-1.0)])
-def test_arithmetic_that_fails_for_the_numbers_tried_is_no_mistake(number):
-    """Compiled, they give infinity or no number; of the moments that come, none may be such."""
+@pytest.mark.parametrize("term", [lambda errors: 1.0 / (errors.ahead - 0.5), lambda errors: sqrt(errors.ahead - 0.1)])
+def test_arithmetic_that_fails_for_some_of_the_numbers_tried_is_no_mistake(term):
+    """Of the moments that come, none may be such; if one is, whoever trains or evaluates says so."""
     task = task_with(
-        reward=lambda moment, weights: Terms(number(weights), 0.0), endings=lambda *_: Endings(0.0, 0.0, 0.0)
+        reward=lambda moment, weights: Terms(term(moment.errors), 0.0), endings=lambda *_: Endings(0.0, 0.0, 0.0)
     )
     check_reward(task, weights_of(task))

@@ -16,7 +16,7 @@ from caster_gym.engines.native.outside_sources import note_outside, outside_dige
 from caster_gym.envs.native.reference import TaskCode, register_task
 from caster_gym.envs.tensor.task import TorchTask
 from caster_gym.tasks.environment import TaskEnv, TaskVectorEnv
-from caster_gym.tasks.registry import TASKS, find_task
+from caster_gym.tasks.registry import TASKS, find_task, register_environments
 from caster_gym.tasks.track import TASK as TRACK
 from caster_gym.tasks.track.reference import Timetable
 
@@ -92,14 +92,23 @@ print(info["reward_terms"]["slowness"])
 """
 
 
+def own_module(folder, monkeypatch, *changes):
+    """The name of a module of one's own with some of its text changed; it can be imported."""
+    name = f"own_{folder.name}"
+    text = OWN.format(helper=f"{name}_helper", module=name)
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / f"{name}.py").write_text(text)
+    (folder / f"{name}_helper.py").write_text(HELPER.format(factor=1.0))
+    monkeypatch.syspath_prepend(folder)
+    return name
+
+
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     """A module of one's own beside its helper, on the path; returns its name."""
-    name = f"own_{tmp_path.name}"
-    (tmp_path / f"{name}.py").write_text(OWN.format(helper=f"{name}_helper", module=name))
-    (tmp_path / f"{name}_helper.py").write_text(HELPER.format(factor=1.0))
-    monkeypatch.syspath_prepend(tmp_path)
-    return name
+    return own_module(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -197,3 +206,98 @@ def test_a_task_of_ones_own_is_compiled_and_after_an_edit_anew(tmp_path):
         announced.append("compiling" in done.stderr)
     assert found == pytest.approx([0.5, 0.5, 0.25], rel=1e-3)
     assert announced == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            ('name="slow"', 'name="track"'),
+            r"task 'track' of own_.* has the name of a task of the package: give it anot",
+        ),
+        (
+            ("{TITLE}", "CasterHold"),
+            r"task 'slow': CasterHold-v0 is task 'hold' of the package: give its environment an",
+        ),
+        (('name="slow"', 'name="my:slow"'), r"task 'my:slow': its name must be one word of letters, digits and _"),
+        (
+            ("{MODULE}:CasterSlow", "CasterSlow"),
+            r"task 'slow': its environment must be written as module:Title, such as",
+        ),
+        (('preview_unit="s"', 'preview_unit="ms"'), r"task 'slow': its preview_unit must be 's' or 'm', got 'ms'"),
+        (
+            ('purpose="be slow"', 'purpose=" "'),
+            r"task 'slow': its purpose must say in words what a robot is to do, got",
+        ),
+        (
+            ("weights=Weights", "weights=float"),
+            r"task 'slow': its weights must be a named tuple with fields, got <class",
+        ),
+        (
+            ("parameters=TRACK.parameters", "parameters=dict"),
+            r"task 'slow': its parameters must be a subclass of TaskPar",
+        ),
+        (
+            ("metrics=TRACK.metrics", "metrics=TRACK.metrics._replace(verdict=Terms)"),
+            r"task 'slow': its verdict, Terms, must be a named tuple with `of`, `failures` and `merit`, and lacks of",
+        ),
+    ],
+)
+def test_words_of_a_task_that_cannot_be_meant_are_told_with_its_line(tmp_path, monkeypatch, change, sentence):
+    old, new = (
+        part.format(MODULE=f"own_{tmp_path.name}", TITLE="CasterSlow") if "{" in part else part for part in change
+    )
+    name = own_module(tmp_path, monkeypatch, (old, new))
+    with pytest.raises(
+        ConfigurationError, match=rf"cannot be imported: OwnCodeError: {sentence}.*\(.*{name}\.py, line 34\)"
+    ):
+        find_task(f"{name}:TASK")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            ("class CasterSlowVectorEnv", "class CasterFastVectorEnv"),
+            r"slow. needs a class CasterSlowVectorEnv\(TaskVectorEnv\) with `definition = TASK` in .*\.py, got None; "
+            "did you mean 'CasterFastVectorEnv'",
+        ),
+        (
+            ("class CasterSlowEnv(TaskEnv)", "class CasterSlowEnv"),
+            r"needs a class CasterSlowEnv\(TaskEnv\) .*, got <class",
+        ),
+        (
+            ("Env):\n    definition = TASK", "Env):\n    pass"),
+            "must have `definition =` the task 'slow'.*, and has none",
+        ),
+        (
+            ("{MODULE}:", "nowhere:"),
+            "task 'slow' has the environment 'nowhere:CasterSlow': there is no module 'nowhere'",
+        ),
+    ],
+)
+def test_a_task_without_its_environments_says_what_is_missing(tmp_path, monkeypatch, change, sentence):
+    """Where the environments are asked for; on tensors, nobody needs them."""
+    name = own_module(tmp_path, monkeypatch, tuple(part.format(MODULE=f"own_{tmp_path.name}") for part in change))
+    with pytest.raises(ConfigurationError, match=sentence):
+        register_environments(f"{name}:TASK")
+
+
+def test_two_tasks_cannot_share_an_identity_for_gymnasium(tmp_path, monkeypatch):
+    """The later one would take the place of the earlier."""
+    monkeypatch.setitem(
+        gym.registry, "CasterSlow-v0", gym.envs.registration.EnvSpec("CasterSlow-v0", "other:CasterSlowEnv")
+    )
+    name = own_module(tmp_path, monkeypatch)
+    with pytest.raises(
+        ValueError, match="CasterSlow-v0 is made by other:CasterSlowEnv already: give the environment of"
+    ):
+        register_environments(f"{name}:TASK")
+
+
+def test_a_syntax_error_is_told_with_its_own_line(tmp_path, monkeypatch):
+    name = own_module(tmp_path, monkeypatch, ("class Terms(NamedTuple):", "class Terms(NamedTuple)"))
+    with pytest.raises(
+        ConfigurationError, match=rf"cannot be imported: SyntaxError: expected ':' \(\S+{name}\.py, line 15\)$"
+    ):
+        find_task(f"{name}:TASK")

@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from caster_gym.agents.comparison.finite_rewards import check_rewards
 from caster_gym.agents.comparison.task_settings import Paths, TaskSettings
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.arrays import Array
@@ -80,6 +81,7 @@ def roll_out(agent: Agent, batch: Batch, seed: int) -> Episodes:
     while running.any():
         actions = agent.act(observations)
         observations, rewards, terminated, truncated, info = batch.step(actions)
+        check_rewards(plain.definition, np.where(running, rewards, 0.0), lambda told=info: told)  # type: ignore[misc]
         if ended.any():  # this step was the reset of these robots
             reset(ended)
         ended = terminated | truncated

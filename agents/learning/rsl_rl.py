@@ -9,6 +9,7 @@ import torch
 from gymnasium.error import DependencyNotInstalled
 from torch import Tensor
 
+from caster_gym.agents.comparison.finite_rewards import check_rewards
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.saved_state import (
     Snapshot,
@@ -46,7 +47,8 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
         (self.num_actions,) = batch.single_action_space.shape
         self.max_episode_length = int(batch.task.engine.plan.source.spans[:, SPAN.periods].max())
         self._lengths = torch.zeros(self.num_envs, dtype=torch.int64, device=self.device)
-        self._seen, _ = batch.reset(seed=seed)
+        self._seen, self._infos = batch.reset(seed=seed)
+        self._doubt = torch.zeros(self.num_envs, device=self.device)
 
     @property
     def episode_length_buf(self) -> Tensor:
@@ -66,10 +68,15 @@ class RslVecEnv(VecEnv):  # type: ignore[misc]  # comes without types
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """Observations, rewards, ends of episodes (1 or 0), and which of them were only a matter of time."""
         self._seen, rewards, terminated, truncated, infos = self.batch.step(actions)
+        self._infos, self._doubt = infos, self._doubt + (rewards - rewards)  # not 0 once one is not finite
         ended = terminated | truncated
         self._lengths = torch.where(ended, 0, self._lengths + 1)
         log = {"/position_error": infos["position_error"]}
         return self.get_observations(), rewards, ended.long(), {"time_outs": truncated & ~terminated, "log": log}
+
+    def check_rewards(self) -> None:
+        """Refuse rewards of steps so far that were not finite; to look in each step would wait for the device."""
+        check_rewards(self.batch.task.definition, self._doubt, lambda: self._infos)
 
     def get_state(self) -> State:
         """Copies of all that the batch goes on from, on the CPU, as a flat dictionary of arrays."""
@@ -91,7 +98,7 @@ def make_runner(settings: RslPPOSettings, environment: RslVecEnv, seed: int) -> 
     spread = {"class_name": "GaussianDistribution", "init_std": math.exp(settings.log_std_init), "std_type": "log"}
     configuration = {
         "num_steps_per_env": settings.n_steps,
-        "check_for_nan": False,  # the robots' step never returns any, and to look would wait for the device
+        "check_for_nan": False,  # to look in each step would wait for the device
         "obs_groups": {"actor": [GROUP], "critic": [GROUP]},
         "actor": {**network, "distribution_cfg": spread},
         "critic": network,
@@ -175,6 +182,7 @@ def learn_with_rsl_rl(run: Run, settings: RslPPOSettings) -> None:
             for group in runner.alg.optimizer.param_groups:
                 group["lr"] = rate
             runner.learn(1)
+            environment.check_rewards()
             steps += round_
             std = runner.alg.get_policy().distribution.log_std_param.detach().exp().mean().item()
             run.record(steps, {"train/learning_rate": rate, "train/std": std})

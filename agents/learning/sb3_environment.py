@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from caster_gym.agents.comparison.evaluation import Batch, bare
+from caster_gym.agents.comparison.finite_rewards import check_rewards
 from caster_gym.states import AnyState, State, check_state, join_states, part_of, read_seeds, seed_arrays, without
 
 
@@ -62,6 +63,7 @@ class SB3VecEnv(VecEnv):
     def step_wait(self) -> VecEnvStepReturn:
         """Observations, float32 rewards, dones and infos of one control period."""
         observations, rewards, terminated, truncated, infos = self.batch.step(self._actions)
+        check_rewards(bare(self.batch).definition, rewards, lambda: infos)
         done = terminated | truncated
         final = infos.get("final_info", {})
         error = np.where(done, final["position_error"], infos["position_error"]) if final else infos["position_error"]

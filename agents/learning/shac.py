@@ -8,6 +8,7 @@ the same time, and what is hardest, the first second from a start with the caste
 """
 
 import copy
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from caster_gym import load_robot
+from caster_gym.agents.comparison.finite_rewards import check_rewards
 from caster_gym.agents.comparison.task_settings import TaskSettings
 from caster_gym.agents.learning.actor import Actor
 from caster_gym.agents.learning.saved_state import (
@@ -151,6 +153,7 @@ class ShortHorizon:
         for k in range(self.settings.n_steps):
             seen.append(outcome.observations.detach())
             state, outcome = self.task.step(state, self._explore(outcome.observations))
+            check_rewards(self.task.definition, outcome.rewards.detach(), partial(self.task.info, outcome.report))
             ended = outcome.ended
             met.append((outcome.observations.detach(), outcome.rewards.detach(), outcome.terminated, ended))
             total = total + (weight * outcome.rewards).sum()

@@ -5,7 +5,7 @@ are on generic scalars; quantities are in the body frame B.
 """
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,6 +242,9 @@ def check_channels(channels: tuple[Channel, ...]) -> None:
 check_channels(CHANNELS)
 
 
+PreviewUnit: TypeAlias = Literal["s", "m"]
+
+
 class Part(NamedTuple):
     """A named part of the observation: physical value = observed · scale."""
 
@@ -266,9 +269,11 @@ class ObservationLayout:
     (True, (2,))
     """
 
-    def __init__(
-        self, robot: Robot, preview: tuple[float, ...], unit: Literal["s", "m"] = "s", nearest: int = 0
-    ) -> None:
+    def __init__(self, robot: Robot, preview: tuple[float, ...], unit: PreviewUnit = "s", nearest: int = 0) -> None:
+        if unit not in get_args(PreviewUnit):
+            raise ValueError(
+                f"the unit of previews must be {' or '.join(map(repr, get_args(PreviewUnit)))}, got {unit!r}"
+            )
         self.robot, self.preview, self.unit, self.nearest = robot, preview, unit, nearest
         self._parts: dict[str, Part] = {}
         points = [{"ahead": f"{ahead:g}{unit}", "ahead_in_words": f"{ahead:g} {unit}"} for ahead in preview]
@@ -293,6 +298,8 @@ class ObservationLayout:
 
     def physical(self, observation: NDArray[np.floating], name: str) -> NDArray[np.float64]:
         """One part (..., size of the part) of observations (..., size), in physical units."""
+        if name not in self._parts:
+            raise ValueError(f"the observation has no part {name!r}; its parts are {', '.join(self._parts)}")
         part = self._parts[name]
         return observation[..., part.place].astype(np.float64) * part.scale
 

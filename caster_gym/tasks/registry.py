@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gymnasium import register
+from gymnasium import register, registry
 
 from caster_gym.configuration import ConfigurationError
 from caster_gym.own_code import OwnCode
@@ -61,9 +61,23 @@ def register_environments(name: str) -> None:
 
     name: as for `find_task`. One of the package is not imported for that.
     """
-    place = f"{TASKS[name].partition(':')[0]}.environment:Caster{name.title()}" if name in TASKS else ""
-    place = place or find_task(name).environment
-    register(id=f"{place.partition(':')[2]}-v0", entry_point=f"{place}Env", vector_entry_point=f"{place}VectorEnv")
+    if name in TASKS:
+        place = classes_of(name)
+    else:
+        task = find_task(name)
+        place = task.environment
+        _ = task.single, task.batch  # which it says now if it has none
+    known = registry.get(identity := f"{place.partition(':')[2]}-v0")
+    if known is not None and known.entry_point != f"{place}Env":
+        raise ValueError(
+            f"{identity} is made by {known.entry_point} already: give the environment of {name!r} another title"
+        )
+    register(id=identity, entry_point=f"{place}Env", vector_entry_point=f"{place}VectorEnv")
+
+
+def classes_of(name: str) -> str:
+    """Module and first part of the names of the environments of a task of the package, which is not imported."""
+    return f"{TASKS[name].partition(':')[0]}.environment:Caster{name.title()}"
 
 
 def _own_task(reference: str, folder: Path | None) -> "Task":

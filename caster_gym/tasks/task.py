@@ -2,19 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from caster_gym.envs.native.reference import TaskCode, register_task
+from caster_gym.envs.observation import PreviewUnit
 from caster_gym.envs.tracking import endings
 from caster_gym.own_errors import OwnCodeError
 from caster_gym.paths.specification import AnyPath, PathLike
 from caster_gym.robot import Robot
 from caster_gym.tasks.measuring import Metrics
+from caster_gym.tasks.names import check_names, class_of
 from caster_gym.tasks.parameters import TaskParameters
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class Task:
     parameters: type[TaskParameters]
     default_path: PathLike
     short_path: Mapping[str, Any]  # one that is quickly made and that no robot fails on, to compile with
-    preview_unit: Literal["s", "m"]  # of the horizons at which observations show the coming reference
+    preview_unit: PreviewUnit  # of the horizons at which observations show the coming reference
 
     source: type[Any]  # type of the reference source, a named tuple; see `ReferenceSource`
     # from parameters; its weights are still to be filled in
@@ -77,6 +78,7 @@ class Task:
     pictures: Pictures = field(default=Pictures())
 
     def __post_init__(self) -> None:
+        check_names(self)
         code = TaskCode(self.title, self.fetch, self.weights, self.reward, self.endings)
         register_task(self.source, code)
 
@@ -88,17 +90,18 @@ class Task:
     @property
     def single(self) -> "type[TaskEnv]":
         """The environment of one robot."""
-        found: type[TaskEnv] = self._class("Env")
+        from caster_gym.tasks.environment import TaskEnv  # which imports tasks
+
+        found: type[TaskEnv] = class_of(self, "Env", TaskEnv)
         return found
 
     @property
     def batch(self) -> "type[TaskVectorEnv]":
         """The environment of many robots."""
-        found: type[TaskVectorEnv] = self._class("VectorEnv")
-        return found
+        from caster_gym.tasks.environment import TaskVectorEnv
 
-    def _class(self, suffix: str) -> Any:
-        return getattr(import_module(self.environment.partition(":")[0]), self.title + suffix)
+        found: type[TaskVectorEnv] = class_of(self, "VectorEnv", TaskVectorEnv)
+        return found
 
     def weights_of(self, parameters: TaskParameters) -> NDArray[np.float64]:
         """The reward's numbers (weights,). Raises OwnCodeError for a weight that is no parameter."""

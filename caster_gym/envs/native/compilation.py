@@ -1,9 +1,16 @@
-"""Announcements of compilation: what is compiled for a task, and how long it takes."""
+"""Compilation in words: what is compiled for a task, how long it takes, and why it cannot be."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+from numba.core.errors import NumbaError
+
+from caster_gym.brief import cut
 from caster_gym.engines.native.compilation import Work
-from caster_gym.envs.native.reference import code_of
+from caster_gym.envs.native.reference import code_of, task_code
+from caster_gym.own_errors import OwnCodeError
 
 
 def of_restart(types: tuple[Any, ...]) -> Work:
@@ -55,3 +62,27 @@ def _part(named: Any, field: str) -> Any:
 
 def _count(named: Any, field: str) -> int:
     return len(_part(named, field))
+
+
+@contextmanager
+def told_plainly(source: Any) -> Iterator[None]:
+    """What Numba says of code that it cannot compile, in one sentence. Raises OwnCodeError.
+
+    source: the reference source of the task.
+    """
+    try:
+        yield
+    except NumbaError as error:
+        name = task_code(type(source)).name
+        raise OwnCodeError(f"the code of {name} cannot be compiled: {_innermost(str(error))}") from error
+
+
+def _innermost(said: str) -> str:
+    """The innermost of Numba's reasons, which it tells first, with its file and line."""
+    before, *place = _FILE.split(said, maxsplit=1)
+    reason = " ".join(_REASON.split(before)[-1].split())
+    return cut(reason, 300) + (f" ({place[0]}, line {place[1]})" if place else "")
+
+
+_FILE = re.compile(r'^ *File "([^"]+)", line (\d+):', re.M)
+_REASON = re.compile(r"\(step: [^)]*\)|specific error:")

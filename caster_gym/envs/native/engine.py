@@ -12,6 +12,7 @@ from caster_gym.engines.native.threads import over_blocks
 from caster_gym.envs import rows
 from caster_gym.envs.native import layout
 from caster_gym.envs.native import step as kernel
+from caster_gym.envs.native.compilation import told_plainly
 from caster_gym.envs.native.robots import Robots
 from caster_gym.envs.plan import Beside, Span
 from caster_gym.envs.report import RESULT, named
@@ -52,9 +53,10 @@ class TaskEngine(Robots):
         views = layout.Views(outcome.observations, outcome.reports, np.zeros((len(RESULT), 0)))
         paths = np.broadcast_to(np.asarray(path, dtype=np.int64), selected.shape).copy()
         before = compilations()
-        kernel.restart(selected, paths, self._world, self.spread, views, self._workspace, self._sizes)
-        if compilations() > before:
-            self._compile_step()
+        with told_plainly(self.plan.source):
+            kernel.restart(selected, paths, self._world, self.spread, views, self._workspace, self._sizes)
+            if compilations() > before:
+                self._compile_step()
         if self._kept_reports is not None:
             self._kept_reports[:, selected] = outcome.reports[:, selected]
         if self._late is not None:

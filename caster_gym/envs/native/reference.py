@@ -68,6 +68,11 @@ def _teach_with_helpers(name: str, top: str) -> None:
             _teach_with_helpers(function.__module__, top)
 
 
+def task_code(source: type) -> TaskCode:
+    """What belongs to a type of reference source."""
+    return _BY_SOURCE[source]
+
+
 def code_of(source: Any) -> TaskCode:
     """What belongs to the compiler's type of a reference source."""
     return _BY_SOURCE[source.instance_class]
