@@ -137,13 +137,13 @@ def slip_of(scene: Scenario) -> Array:
     return np.hypot(offset * turn + radius * roll, trail * turn)
 
 
-def peer_model(scene: Scenario, step: float) -> tuple[Any, Any]:
+def peer_model(scene: Scenario, step: float, softness: float = SOFTNESS) -> tuple[Any, Any]:
     """MuJoCo's model and data of a scenario: a platform that may tip, settled on its wheels before it moves.
 
-    Contacts have one time constant whatever the step; and motors have no limits, as ours have none here.
+    Contacts have the time constant `softness` [s] whatever the step; motors have no limits, as ours have none here.
     """
     model: Any = mujoco.MjModel.from_xml_string(mjcf(scene.robot, step, scene.friction, tips=True))
-    model.geom_solref[:, 0], model.opt.impratio, model.actuator_ctrllimited[:] = SOFTNESS, STIFFNESS, 0
+    model.geom_solref[:, 0], model.opt.impratio, model.actuator_ctrllimited[:] = softness, STIFFNESS, 0
     data: Any = mujoco.MjData(model)
     body, joints = joint_indices(scene.robot, model)
     data.qpos[joints[1::2]] = scene.state[6:]
@@ -155,10 +155,10 @@ def peer_model(scene: Scenario, step: float) -> tuple[Any, Any]:
     return model, data
 
 
-def peer(scene: Scenario, step: float) -> Course:
-    """MuJoCo's course at a time step."""
+def peer(scene: Scenario, step: float, softness: float = SOFTNESS) -> Course:
+    """MuJoCo's course at a time step, with contacts of a time constant. [s]"""
     robot, n = scene.robot, scene.robot.caster_count
-    model, data = peer_model(scene, step)
+    model, data = peer_model(scene, step, softness)
     body, joints = joint_indices(robot, model)
     wheels = [(model.body(f"wheel_{i}").id, caster.radius) for i, caster in enumerate(robot.casters, start=1)]
     full, count = data.ctrl.copy(), round(scene.duration / step)
@@ -178,6 +178,12 @@ def peer(scene: Scenario, step: float) -> Course:
             slips[k + 1, i] = np.hypot(*at_floor[:2])
         poses[k + 1], rolls[k + 1] = data.qpos[body], data.qvel[joints[0::2]]
     return Course(times, poses, slips, rolls)
+
+
+def until(course: Course, time: float) -> Course:
+    """The course up to a time. [s]"""
+    count = int(np.searchsorted(course.time, time + 1e-9))  # rounding of times
+    return Course(*(series[:count] for series in course))
 
 
 def measure(scene: Scenario, course: Course) -> float:

@@ -6,9 +6,26 @@ import pytest
 from caster_gym import load_robot
 from caster_gym.shipped_files import names_of
 from scripts.slip_peer import draw_courses, page, write_table
-from scripts.slip_runs import OUR_STEPS, STEPS, Comparison, Rate, measure, off, on_three, ours, peer, scenarios
+from scripts.slip_runs import (
+    OUR_STEPS,
+    SOFTNESS,
+    STEPS,
+    Comparison,
+    Rate,
+    measure,
+    off,
+    on_three,
+    ours,
+    peer,
+    scenarios,
+    until,
+)
 
 FINE = 1.25e-4  # [s] MuJoCo's
+HARD = (
+    SOFTNESS / 2
+)  # [s] time constant of its contacts where less than 20 ms are measured: they lag behind by about that
+FASTEST = 2.0  # [m/s] of a wheel that slides: on a faster one, MuJoCo's contacts hop more, the harder they are
 
 
 def scene_of(robot, name):
@@ -18,17 +35,17 @@ def scene_of(robot, name):
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", names_of("robots"))
 @pytest.mark.parametrize(
-    ("name", "tolerance"),
+    ("name", "tolerance", "softness"),
     [
-        ("onset of slip", 0.06),  # creep reaches 20 mm/s some ms before the limit does
-        ("spin-up of a wheel", 0.05),  # loads build up in 5 ms of 150
-        ("regrip", 0.06),  # the last mm/s of a contact that is a spring and a damper
-        ("braking", 0.06),  # loads that swing while the robot pitches
+        ("onset of slip", 0.06, SOFTNESS),  # creep reaches 20 mm/s some ms before the limit does
+        ("spin-up of a wheel", 0.05, SOFTNESS),  # loads build up in 5 ms of 150
+        ("regrip", 0.06, HARD),  # the last mm/s of a contact that is a spring and a damper
+        ("braking", 0.06, SOFTNESS),  # loads that swing while the robot pitches
     ],
 )
-def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance):
+def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance, softness):
     scene = scene_of(robot, name)
-    mine, theirs = ours(scene, 1e-3), peer(scene, FINE)
+    mine, theirs = ours(scene, 1e-3), peer(scene, FINE, softness)
     assert measure(scene, mine) == pytest.approx(measure(scene, theirs), rel=tolerance)
     assert mine.slip.max() > 0.2
 
@@ -36,13 +53,17 @@ def test_slip_starts_grows_and_ends_as_in_mujoco(robot, name, tolerance):
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", names_of("robots"))
 def test_drifts_end_where_mujocos_do(robot):
-    """A way of some dm, on which wheels slide at up to 2 m/s: MuJoCo's contacts hop then."""
+    """A way of some dm, up to where a wheel slides at 2 m/s: MuJoCo's contacts hop then."""
     scene = scene_of(robot, "drift")
-    mine, theirs = ours(scene, 1e-3), peer(scene, FINE)
+    whole = ours(scene, 1e-3)
+    fast = whole.slip.max(axis=1) > FASTEST
+    end = whole.time[np.argmax(fast)] if fast.any() else scene.duration
+    mine, theirs = until(whole, end), until(peer(scene, FINE), end)
     way = float(np.hypot(*np.diff(mine.pose[:, :2], axis=0).T).sum())
     assert way > 0.02
     assert off(theirs, mine) < 0.15 * way
     assert np.sort(mine.slip.max(axis=0))[-2] > 0.3  # two wheels of three
+    assert mine.time[-1] == pytest.approx(theirs.time[-1], abs=FINE)
 
 
 @pytest.mark.slow
