@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from caster_gym.agents.control.computed_torque import ComputedTorqueSettings
+from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.configuration import ConfigurationError, parse, read_yaml

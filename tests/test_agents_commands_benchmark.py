@@ -14,8 +14,10 @@ from caster_gym.agents.commands.benchmark import BenchmarkSettings, read_compari
 from caster_gym.agents.comparison.evaluation import bare, evaluation_batch, roll_out
 from caster_gym.agents.comparison.results import Contender, compare
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history, tune
-from caster_gym.agents.control.computed_torque import ComputedTorque, ComputedTorqueSettings
+from caster_gym.agents.comparison.tuning import tune
+from caster_gym.agents.comparison.validation import VALIDATION_SEED, read_history
+from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import ControllerSettings
 from caster_gym.agents.learning.bundle import load_policy
 from caster_gym.agents.learning.settings import LearnerSettings
@@ -179,7 +181,8 @@ def test_the_natural_frequency_is_chosen_on_validation_paths(task):
         metrics = measure(roll_out(agent, batch, VALIDATION_SEED), 2.0)
         errors[frequency] = metrics.position_rmse.mean()
     settings = ComputedTorqueSettings(algorithm="computed torque", natural_frequencies=listed)
-    tuned, best = tune(settings, batch)
+    tuned, best, tried = tune(settings, batch)
+    assert [one.settings for one in tried] == settings.candidates()
     frequency = min(errors, key=lambda one: errors[one])
     assert best == settings.model_copy(update={"natural_frequencies": (frequency,)})
     assert isinstance(tuned, ComputedTorque)
@@ -353,7 +356,7 @@ def test_agents_of_ones_own_take_part_as_contributing_tells(tmp_path, settings, 
     facts = yaml.safe_load((folder / "run.yaml").read_text(encoding="utf-8"))
     assert facts["agents"]["spring"] == {"algorithm": "springs:Spring", "stiffness": 150.0, "damping": 20.0}
     assert {name: one["module"] for name, one in facts["sources"].items()} == {
-        "controller": "caster_gym.agents.control.computed_torque",
+        "controller": "caster_gym.agents.control.computed_torque_settings",
         "spring": "springs",
         "search": "search",
     }

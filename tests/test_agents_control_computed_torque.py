@@ -50,7 +50,7 @@ def simulated_errors(period, substeps, duration):
 
 
 def test_errors_obey_their_linear_equation():
-    """ë + k_d ė + k_p e = 0, solved in closed form, while the robot drives along its paths."""
+    """(T1): ë + k_d ė + k_p e = 0, solved in closed form, while the robot drives along its paths."""
     period = 0.002
     series, rate, agent = simulated_errors(period, substeps=1, duration=1.0)
     roots = np.roots([1.0, agent.gains.damping, agent.gains.stiffness])
@@ -83,7 +83,7 @@ def test_errors_under_held_torques_obey_their_recursion():
 
 @pytest.mark.parametrize("robot", ["chung2008", "xr4000"])
 def test_what_held_torques_cost_is_of_second_order_in_the_period(robot):
-    """At the same gains half the period leaves about a quarter of the error; torques for its start would leave half."""
+    """(T4): at the same gains half the period leaves about a quarter of the error; torques for its start, a half."""
     errors = []
     for period, substeps in ((0.02, 8), (0.01, 4)):
         batch, agent = make(robot, control_period=period, substeps=substeps)
@@ -97,7 +97,7 @@ def test_what_held_torques_cost_is_of_second_order_in_the_period(robot):
 
 
 def test_the_velocity_changes_in_the_world_as_wanted_while_robot_and_casters_turn():
-    """Over one period from given casters, without any feedback: what it misses falls with the square of the period."""
+    """(T3): over a period from given casters, without feedback. What it misses falls with the square of the period."""
     omega, wanted = 2.0, [0.5, 0.3, 0.0]
     robot = load_robot("chung2008")
     layout, model = ObservationLayout(robot, ()), Model(robot)
@@ -127,6 +127,7 @@ def test_the_velocity_changes_in_the_world_as_wanted_while_robot_and_casters_tur
 @pytest.mark.parametrize("frequency", [0.1, 5.0, 20.0, 100.0])
 @pytest.mark.parametrize("period", [0.001, 0.02, 0.1])
 def test_gains_put_both_poles_of_the_sampled_double_integrator(frequency, period):
+    """(T2)"""
     stiffness, damping = gains(frequency, period)
     step = np.array([[1.0, period], [0.0, 1.0]])
     held = np.array([[0.5 * period**2], [period]])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from caster_gym.agents.control.computed_torque import ComputedTorque, ComputedTorqueSettings
+from caster_gym.agents.control.computed_torque import ComputedTorque
+from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
 from caster_gym.agents.control.own_controller import candidates_of, controller_of
 from caster_gym.agents.control.protocol import ControllerSettings
 from caster_gym.own_errors import OwnCodeError

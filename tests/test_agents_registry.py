@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 import caster_gym
-from caster_gym.agents.control.computed_torque import ComputedTorqueSettings
+from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import PPOSettings, SACSettings
 from caster_gym.agents.registry import read_agent

@@ -13,7 +13,8 @@ from caster_gym.agents.comparison.regimes import write_regimes
 from caster_gym.agents.comparison.results import Contender, compare, write_results
 from caster_gym.agents.comparison.scenarios import EACH, AnyEntrant, Entrant, Scenario, ScenarioName, tasks_of
 from caster_gym.agents.comparison.task_settings import Seed, Seeds, TaskSettings
-from caster_gym.agents.comparison.validation import Tuned, read_history, tune
+from caster_gym.agents.comparison.tuning import TUNING, Tuned, told, tune, write_tuning
+from caster_gym.agents.comparison.validation import read_history
 from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
 from caster_gym.agents.learning import training, usual_names
 from caster_gym.agents.learning.bundle import load_policy
@@ -22,6 +23,7 @@ from caster_gym.agents.learning.training import Job, train_all
 from caster_gym.agents.registry import read_agent
 from caster_gym.agents.workers.calls import Workers
 from caster_gym.configuration import ConfigurationError, Frozen, Positive
+from caster_gym.durable_files import write_file
 from caster_gym.engines.tensor.threads import DEFAULT, limit_threads
 from caster_gym.file_names import NameOrFile
 from caster_gym.paths.naming import unknown_name
@@ -30,7 +32,7 @@ from caster_gym.shipped_files import read_settings
 
 WORTH_KEEPING = tuple(f"policies/*/{name}" for name in training.WORTH_KEEPING)
 FILES = (
-    *(*results.FILES, *regimes.FILES, *(f"*/{name}" for name in results.FILES), "run.yaml"),
+    *(*results.FILES, *regimes.FILES, TUNING, *(f"*/{name}" for name in results.FILES), "run.yaml"),
     *(f"policies/*/{name}" for name in training.FILES),
 )
 
@@ -139,7 +141,7 @@ def run_benchmark(
         for made, called, one, agent in _preparations(comparison, tasks):
             names[made] = called
             if isinstance(agent, ControllerSettings):
-                tuned[made] = tune(agent, evaluation_batch(one, one.validation, starts=1), made[0])
+                tuned[made] = tune(agent, evaluation_batch(one, one.validation, starts=1), *made)
     train_all([job for group in jobs.values() for job in group], threads, resume, workers)
     ready: dict[Made, list[tuple[Agent, int | None]]] = {
         **{made: [(one.controller, None)] for made, one in tuned.items()},
@@ -168,13 +170,19 @@ def run_benchmark(
     if settings.scenarios:
         results_of = {scenario: found.results for scenario, found in compared.items()}
         text = write_regimes(folder, results_of, how, settings.confidence)
+    chosen = {names[made]: one for made, one in tuned.items()}
+    learned = {f"{names[made]}, each of {len(group)} seeds": group[0].agent.n_timesteps for made, group in jobs.items()}
+    if budgets := told(chosen, learned):
+        text = f"{text}\n\n{budgets}"
+        write_file(folder / "table.md", text + "\n")
+        write_tuning(folder / TUNING, chosen)
     write_provenance(
         folder,
         benchmark=settings.model_dump(mode="json"),
         threads=threads,
         task=task.model_dump(mode="json"),
         agents={name: agent.model_dump(mode="json") for name, agent in agents.items()},
-        tuned={names[made]: best.model_dump(mode="json") for made, (_, best) in tuned.items()},
+        tuned={name: one.settings.model_dump(mode="json") for name, one in chosen.items()},
         sources={name: agent.source for name, agent in agents.items()},
         robot=bare(test).robot.model_dump(mode="json"),
     )

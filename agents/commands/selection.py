@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from caster_gym.agents.comparison.evaluation import Batch, bare, evaluation_batch
 from caster_gym.agents.comparison.task_settings import TaskSettings
-from caster_gym.agents.comparison.validation import tune
-from caster_gym.agents.control.protocol import Agent, AgentSettings, ControllerSettings
+from caster_gym.agents.comparison.tuning import Tuned, tune
+from caster_gym.agents.control.protocol import Agent, ControllerSettings
 from caster_gym.agents.learning.bundle import DESCRIPTION, load_policy
 from caster_gym.agents.registry import is_python, read_agent
 from caster_gym.bounded_files import expanded
@@ -27,10 +27,10 @@ class ChosenTask(NamedTuple):
 
 
 class ChosenAgent(NamedTuple):
-    """An agent, and the settings of a model-based one as they were tuned."""
+    """An agent, and how a model-based one was tuned."""
 
     agent: Agent
-    settings: AgentSettings | None
+    tuned: Tuned | None
 
 
 def choose_agent(name: str, settings: TaskSettings, batch: Batch) -> ChosenAgent:
@@ -42,7 +42,8 @@ def choose_agent(name: str, settings: TaskSettings, batch: Batch) -> ChosenAgent
     named = name in names_of("agents") or is_python(name) or (is_yaml(name) and folder.name not in RESULTS)
     known = read_agent(name) if named else None
     if isinstance(known, ControllerSettings) and not (folder / DESCRIPTION).is_file():
-        return ChosenAgent(*tune(known, evaluation_batch(settings, settings.validation, starts=1), name))
+        tuned = tune(known, evaluation_batch(settings, settings.validation, starts=1), name)
+        return ChosenAgent(tuned.controller, tuned)
     if known is None and not folder.exists() and len(folder.parts) == 1:
         model_based = [one for one in names_of("agents") if isinstance(read_agent(one), ControllerSettings)]
         own = own_file(name)

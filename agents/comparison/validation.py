@@ -6,9 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
-from caster_gym.agents.comparison.task_settings import in_brief
-from caster_gym.agents.control.own_controller import candidates_of, controller_of
-from caster_gym.agents.control.protocol import Agent, ControllerSettings
+from caster_gym.agents.control.protocol import Agent
 from caster_gym.report.tables import write_csv
 from caster_gym.table_files import read_lines
 
@@ -28,38 +26,10 @@ class Validation(NamedTuple):
         return {"steps": self.steps, "seconds": self.seconds, **self.verdict._asdict()}
 
 
-class Tuned(NamedTuple):
-    """A controller, and the settings that did best on validation paths."""
-
-    controller: Agent
-    settings: ControllerSettings
-
-
 def verdict_on(agent: Agent, validation: Batch) -> Any:
     """How good an agent is on a batch of validation paths, always from the same starts."""
     how = bare(validation).definition.metrics
     return how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
-
-
-def tune(settings: ControllerSettings, validation: Batch, called: str | None = None) -> Tuned:
-    """The controller whose settings, of the candidates, do best on validation paths, as policies are chosen there.
-
-    called: what messages call the agent, its algorithm if nothing else.
-    """
-    plain = bare(validation)
-    if redefining := [feature for feature in getattr(validation, "features", ()) if feature.redefines_actions]:
-        raise ValueError(
-            f"{settings.algorithm} gives torques, but the task's actions are those of {in_brief(redefining[0])}: leave "
-            "that out of its wrappers"
-        )
-    layout, period = plain.engine.layout, plain.task.control_period
-    called = called or settings.algorithm
-    tried = [Tuned(controller_of(one, layout, period, called), one) for one in candidates_of(settings, called)]
-    if len(tried) > 1:
-        return max(tried, key=lambda one: verdict_on(one.controller, validation).merit)
-    if settings.is_own:  # another one acts once, so that mistakes show before anything is trained
-        controller_of(tried[0].settings, layout, period, called).act(validation.reset(seed=VALIDATION_SEED)[0])
-    return tried[0]
 
 
 def write_history(path: Path, history: Sequence[Validation]) -> None:

@@ -6,36 +6,18 @@
     F        M v̇ + h + friction, with v̇ the rate of the twist's components that a means
     T        control period, over which torques are held                                     [s]
 
-With the exact model every error obeys ë + k_d ė + k_p e = 0 while no motor is at its limit.
-
-Torques that are held act in the frame of a robot that turns and on casters that steer. Were F and the motors' wrenches
-B taken at the start of the period, the acceleration would lag by half a period: the wrench alone turns by ωT/2 on
-average, which costs (ωT/2) a and leaves an error of (ωT/2) a / k_p, of first order in T. Here they are taken in the
-middle of the period, t = T/2, where what changes linearly over the period cancels; the error that is left is of second
-order. Until then the robot is taken to accelerate as its reference, a_ref: the part of the feedback would add errors
-times T, and may be beyond the motors. With R(φ) the rotation by φ and α the third component of a_ref,
-
-    φ = ω t + α t²/2        heading gained
-    v(t) = R(−φ) (v + a_ref t)        components in B as it stands then
-    δ(t) = δ + t δ̇(δ + δ̇ t/2, v(t/2))        steering, by the midpoint rule
-
-A held torque gives the robot the mean acceleration of a reference with jerk j, and so its velocity at the next sample,
-but not its place: the held wrench turns with the robot, as a jerk ω × a, and the rest of j moves the reference by
-j T³/6 − (T/2 · j) T²/2 = −j T³/12 per period. With feedback of ė the error would settle where k_p e = k_d T² j/12. The
-places meet where the velocities differ by ė = T²/12 (j − ω × a) instead, and that is subtracted from ė.
+With the exact model every error obeys ë + k_d ė + k_p e = 0 while no motor is at its limit. Torques that are held turn
+with the robot and on casters that steer, and so everything is taken in the middle of the period. Derivation:
+docs/control.md, section T.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from caster_gym.agents.control.protocol import ControllerSettings
 from caster_gym.analysis.actuation import warn_if_singular
 from caster_gym.arrays import Array
-from caster_gym.configuration import Positive
 from caster_gym.control.torque_distribution import distribute
 from caster_gym.engines.numpy_model import Model
 from caster_gym.envs.observation import ObservationLayout
@@ -61,7 +43,7 @@ def gains(natural_frequency: float, period: float) -> Gains:
     characteristic polynomial to (z − p)² gives the gains below, critically damped however long the period is.
     """
     p = np.exp(-natural_frequency * period)
-    return Gains(float((1.0 - p) ** 2 / period**2), float((1.0 - p) * (3.0 + p) / (2.0 * period)))
+    return Gains(float((1.0 - p) ** 2 / period**2), float((1.0 - p) * (3.0 + p) / (2.0 * period)))  # (T2)
 
 
 def known_model(robot: Robot, known: KnownModel) -> Model:
@@ -122,16 +104,27 @@ class ComputedTorque:
         cos_sin = self.layout.physical(observations, "directions").reshape(len(observations), -1, 2)
         steering = np.arctan2(cos_sin[..., 1], cos_sin[..., 0])
         twist = self.layout.physical(observations, "twist")
-        reference, wanted = self._accelerations(observations, twist)
+        shares = self._shares(steering, twist, *self._accelerations(observations, twist))
+        return shares.astype(np.float32)
+
+    def _shares(
+        self, steering: Array, twist: Array, reference: Array, wanted: Array, disturbance: Array | None = None
+    ) -> Array:
+        """Torques (robots, driven joints) as shares of the greatest, for accelerations (robots, 3) as below.
+
+        disturbance (robots, 3): a wrench that pushes the robots in their frames [N, N, N m].
+        """
         middle = self._ahead(steering, twist, reference, 0.5 * self.period)
         rate = _seen_after(middle.turn, wanted) - frame_rate(middle.twist)
         force = self._model.inverse_dynamics(middle.steering, middle.twist, rate)
+        if disturbance is not None:
+            force -= disturbance
         b = self._model.motor_wrenches(middle.steering)
         speeds = (middle.twist[:, None] @ b)[:, 0] / self._max_torque  # a motor's wrench and speed have the same row
         low, high = torque_range(speeds, np.ones_like(speeds), self._max_speed)
         b[:, 2] /= self._model.characteristic_length
         force[:, 2] /= self._model.characteristic_length
-        return distribute(b, force, low, high).astype(np.float32)
+        return distribute(b, force, low, high)
 
     def _ahead(self, steering: Array, twist: Array, acceleration: Array, time: float) -> Motion:
         """How robots move after some time [s] of an acceleration (robots, 3), constant in the world, given in B now."""
@@ -143,7 +136,7 @@ class ComputedTorque:
         half = 0.5 * time
         halfway = steering + half * self._model.rates(steering, twist)[2]
         steering_rates = self._model.rates(halfway, turn_and_twist(half)[1])[2]
-        return Motion(*turn_and_twist(time), steering + time * steering_rates)
+        return Motion(*turn_and_twist(time), steering + time * steering_rates)  # (T3)
 
     def _accelerations(self, observations: NDArray[np.float32], twist: Array) -> tuple[Array, Array]:
         """Accelerations (robots, 3) of the reference, and the wanted ones, which bring errors down as the gains say."""
@@ -153,10 +146,16 @@ class ComputedTorque:
         error = np.concatenate([see(observations, "position_error"), turn[:, None]], axis=1)
         rate = see(observations, "twist_error")
         jerk = self._jerk(observations, twist + rate)
-        reference = see(observations, "reference_acceleration") + 0.5 * self.period * jerk  # in the middle
+        return self._feedback(error, rate, twist, see(observations, "reference_acceleration"), jerk)
+
+    def _feedback(
+        self, error: Array, rate: Array, twist: Array, acceleration: Array, jerk: Array
+    ) -> tuple[Array, Array]:
+        """The same from errors and their rates, and the acceleration and jerk of the reference, each (robots, 3)."""
+        reference = acceleration + 0.5 * self.period * jerk  # in the middle
         turning = frame_rate(np.column_stack([reference[:, :2], twist[:, 2]]))
-        rate -= self.period**2 / 12.0 * (jerk - turning)
-        return reference, reference + self.gains.damping * rate + self.gains.stiffness * error
+        rate = rate - self.period**2 / 12.0 * (jerk - turning)  # (T4)
+        return reference, reference + self.gains.damping * rate + self.gains.stiffness * error  # (T1)
 
     def _jerk(self, observations: NDArray[np.float32], velocity: Array) -> Array:
         """Jerk (robots, 3) of the reference, which the preview shows; zero without a preview.
@@ -199,28 +198,3 @@ def _seen_after(turn: Array, vector: Array) -> Array:
     c, s = np.cos(turn), np.sin(turn)
     x, y, z = vector.T
     return np.stack([c * x + s * y, c * y - s * x, z], axis=1)
-
-
-class ComputedTorqueSettings(ControllerSettings):
-    """Model-based control; its natural frequency is the one of those listed that does best on validation paths."""
-
-    usual_names: ClassVar[Mapping[str, str]] = {
-        **dict.fromkeys(
-            ("natural_frequency", "bandwidth"),
-            "it is chosen among the 'natural_frequencies' listed, e.g. natural_frequencies: [10.0]",
-        ),
-        **dict.fromkeys(
-            ("kp", "kd"), "gains follow from the natural frequency: list it as natural_frequencies: [10.0]"
-        ),
-    }
-    algorithm: Literal["computed torque"]
-    known: KnownModel = "exact"
-    natural_frequencies: Annotated[tuple[Positive, ...], Field(min_length=1)] = (5.0, 10.0, 15.0, 20.0, 30.0)
-
-    def controller(self, layout: ObservationLayout, period: float) -> ComputedTorque:
-        """The controller with the first natural frequency."""
-        return ComputedTorque(layout, self.natural_frequencies[0], period, self.known)
-
-    def candidates(self) -> Sequence[Self]:
-        """The same settings with each natural frequency alone."""
-        return [self.model_copy(update={"natural_frequencies": (one,)}) for one in self.natural_frequencies]

@@ -3,7 +3,7 @@
 import hashlib
 import sys
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from caster_gym.configuration import Frozen
 from caster_gym.envs.observation import ObservationLayout
+from caster_gym.wrappers.feature import Feature
 
 
 class Agent(Protocol):
@@ -58,6 +59,11 @@ class AgentSettings(Frozen):
 class ControllerSettings(AgentSettings):
     """Settings of a model-based controller, which does not learn."""
 
+    @property
+    def calmness(self) -> float:
+        """Share of the least error, or of the greatest reward, that is given away for calmer torques."""
+        return 0.0
+
     @abstractmethod
     def controller(self, layout: ObservationLayout, period: float) -> Agent:
         """The controller that acts on observations of this layout, once every period [s]."""
@@ -65,3 +71,14 @@ class ControllerSettings(AgentSettings):
     def candidates(self) -> Sequence[Self]:
         """Settings to try on the validation paths, where the best are chosen; by default, only these."""
         return [self]
+
+    def informed(self, layout: ObservationLayout, features: Sequence[Feature]) -> Self:
+        """The settings with what they leave to the plant's features to say; by default, they leave nothing.
+
+        Raises ValueError where they contradict the features.
+        """
+        return self
+
+    def search(self) -> Generator[Sequence[Self], Self, None]:
+        """Lists of settings to try, each after being sent the best ones so far; by default, the candidates alone."""
+        yield self.candidates()

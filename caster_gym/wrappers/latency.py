@@ -1,6 +1,6 @@
 """Latency between commands and torques: delays, and motors that lag."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -61,6 +61,20 @@ class MotorLag(Feature):
         return _Lag(self, place)
 
 
+class Lag(NamedTuple):
+    """What remains to be done after a control period, as a share of what remained before."""
+
+    end: Array  # at its end
+    mean: Array  # in its mean
+
+
+def lag_of(time_constants: Array | float, period: float) -> Lag:
+    """Motors that lag by time constants [s]. With x = period / time constant, exp(−x) and (1 − exp(−x)) / x."""
+    with np.errstate(divide="ignore"):
+        x = np.float64(period) / time_constants
+    return Lag(np.exp(-x), -np.expm1(-x) / x)
+
+
 class _Delay(Runtime):
     def __init__(self, feature: ActionDelay, place: Place) -> None:
         low, high = feature.periods if isinstance(feature.periods, tuple) else (feature.periods, feature.periods)
@@ -84,9 +98,6 @@ class _Delay(Runtime):
 
 
 class _Lag(Runtime):
-    """With x = period / time constant, a share exp(−x) of what remains is left after a period, (1 − exp(−x)) / x of it
-    in the mean over the period."""
-
     def __init__(self, feature: MotorLag, place: Place) -> None:
         self._range = feature.time_constant
         self._place = place
@@ -97,10 +108,7 @@ class _Lag(Runtime):
     def begin(self, robots: np.ndarray, quantities: Quantities) -> None:
         self._followed[robots] = 0.0
         constants: Array = between(self._range, uniforms(self._place.seeds[robots], FIRST))
-        with np.errstate(divide="ignore"):
-            x = self._place.period / constants
-        self._left[robots] = np.exp(-x)
-        self._mean_left[robots] = -np.expm1(-x) / x
+        self._left[robots], self._mean_left[robots] = lag_of(constants, self._place.period)
 
     def act(self, actions: Actions) -> Actions:
         remaining = self._followed - actions
