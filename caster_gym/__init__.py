@@ -11,6 +11,7 @@ from caster_gym.tasks import registry as _tasks
 if TYPE_CHECKING:
     from caster_gym import mechanics, wrappers
     from caster_gym.agents.control.computed_torque import ComputedTorque
+    from caster_gym.agents.control.observer_torque import ObserverTorque
     from caster_gym.agents.learning.bundle import load_policy
     from caster_gym.agents.learning.sb3_environment import SB3VecEnv
     from caster_gym.arena.arena import Arena
@@ -48,6 +49,7 @@ __all__ = [
     "Floor",
     "Model",
     "ObservationLayout",
+    "ObserverTorque",
     "PeriodDerivatives",
     "Robot",
     "SB3VecEnv",
@@ -81,6 +83,7 @@ _HOMES = {
     "Floor": "caster_gym.floor",
     "Model": "caster_gym.engines.numpy_model",
     "ObservationLayout": "caster_gym.envs.observation",
+    "ObserverTorque": "caster_gym.agents.control.observer_torque",
     "PeriodDerivatives": "caster_gym.engines.native.derivatives",
     "Robot": "caster_gym.robot",
     "SB3VecEnv": "caster_gym.agents.learning.sb3_environment",

@@ -106,6 +106,8 @@ def test_a_comparison_leaves_everything_behind(finished):
         *[("PPO", str(seed)) for seed in SEEDS],
     ]
     assert len(rows(folder / "summary.csv")) == 2 * len(TrackMetrics._fields)
+    assert len(rows(folder / "tuning.csv")) == len(FREQUENCIES)
+    assert f"{PATHS * 150 * len(FREQUENCIES):,} (2 settings); ppo, each of 2 seeds 512." in text
 
 
 @pytest.mark.slow

@@ -70,11 +70,14 @@ def test_a_policy_that_does_not_fit_the_task_is_refused(trained, call, tmp_path)
     assert_refused(result, "the policy needs a preview of (0.1, 0.2, 0.4) s, the task shows (0.1,) s")
 
 
-def test_model_based_control_is_evaluated_by_name(call):
+def test_model_based_control_is_evaluated_by_name(call, tmp_path):
     result = call("evaluate", "computed_torque", "--task", "task.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert "computed torque" in result.stdout
     assert "0 of 2" in result.stdout
+    assert "Control periods simulated to tune and to learn: computed torque " in result.stdout
+    with (tmp_path / "results" / "tuning.csv").open(newline="", encoding="utf-8") as file:
+        assert sum(row["chosen"] == "1" for row in csv.DictReader(file)) == 1
 
 
 def test_a_policy_is_not_evaluated_in_the_other_environment(trained, call, tmp_path):

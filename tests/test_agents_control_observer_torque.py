@@ -11,6 +11,7 @@ from caster_gym.agents.control.beliefs import Beliefs, Prediction, Sensors
 from caster_gym.agents.control.computed_torque import ComputedTorque
 from caster_gym.agents.control.observer_torque import ObserverTorque
 from caster_gym.agents.control.reference_ahead import course_of
+from caster_gym.configuration import ConfigurationError
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import load_robot
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
@@ -58,7 +59,7 @@ def position_errors(env: Any, agent: Any, settling: float = 1.0) -> Any:
 
 def test_a_predicted_state_is_the_state_in_which_the_action_arrives():
     """After two periods of delay and with a lag, from rest on, while motors saturate at first."""
-    env, agent = make(*LATE, beliefs=Beliefs(KNOWN))
+    env, agent = make(*LATE, beliefs=Beliefs(prediction=KNOWN))
     rows, _ = drive(env, agent, 60)
     layout = agent.layout
     for k in range(len(rows) - 2):
@@ -74,7 +75,7 @@ def test_a_predicted_state_is_the_state_in_which_the_action_arrives():
 
 def test_the_course_of_the_reference_is_where_it_will_be():
     """(X1), (X2): 2 periods ahead within the first piece, 8 within the second."""
-    env, agent = make(beliefs=Beliefs(KNOWN))
+    env, agent = make(beliefs=Beliefs(prediction=KNOWN))
     rows, infos = drive(env, agent, 60)
     for ahead, exactness in ((2, 2e-6), (8, 2e-5)):  # [m], [rad] of a quartic up to 0.1 s and of a cubic up to 0.2 s
         for k in range(20, 50, 10):
@@ -89,7 +90,7 @@ def test_the_course_of_the_reference_is_where_it_will_be():
 
 def test_late_actions_and_lags_cost_nothing_once_they_are_known():
     """(X10), against the same controller where nothing is late, and one that does not know."""
-    late, agent = make(*LATE, beliefs=Beliefs(KNOWN))
+    late, agent = make(*LATE, beliefs=Beliefs(prediction=KNOWN))
     punctual, plain = make()
     ours, best = position_errors(late, agent), position_errors(punctual, plain)
     assert_allclose(np.median(ours / best), 1.0, atol=0.05)
@@ -152,7 +153,7 @@ def test_a_constant_force_leaves_no_offset_once_it_is_found():
 
 def test_robots_do_not_touch_one_another():
     """One alone acts as it does among others; a new episode of one leaves the others alone."""
-    beliefs = Beliefs(KNOWN, Sensors(**NOISE), 1.0, 1.0)
+    beliefs = Beliefs(prediction=KNOWN, sensors=Sensors(**NOISE), unmodelled=1.0, drift=1.0)
     env, agent = make(*LATE, beliefs=beliefs)
     alone, again = (ObserverTorque(agent.layout, 20.0, PERIOD, beliefs) for _ in range(2))
     observations, _ = env.reset(seed=1)
@@ -174,11 +175,13 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(
         ValueError, match=r"no farther than the preview, which ends after 0\.2 s, got a delay of 11 con"
     ):
-        ObserverTorque(layout, 5.0, PERIOD, Beliefs(Prediction(delay=11)))
+        ObserverTorque(layout, 5.0, PERIOD, {"prediction": {"delay": 11}})
     with pytest.raises(
         ValueError, match="need a reference that a clock leads, with a preview in s, got one in m along"
     ):
         ObserverTorque(ObservationLayout(robot, (0.1,), "m"), 5.0, PERIOD, Beliefs())
+    with pytest.raises(ConfigurationError, match=r"beliefs: .*delays.*delay"):
+        ObserverTorque(layout, 5.0, PERIOD, {"prediction": {"delays": 1}})
     agent = ObserverTorque(layout, 5.0, PERIOD, Beliefs())
     with pytest.raises(ValueError, match="remembers 0 robots got observations of 2: call its method reset first"):
         agent.act(np.zeros((2, layout.size), dtype=np.float32))

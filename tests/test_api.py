@@ -29,6 +29,7 @@ NAMES = [
     "Floor",
     "Model",
     "ObservationLayout",
+    "ObserverTorque",
     "PeriodDerivatives",
     "Robot",
     "SB3VecEnv",

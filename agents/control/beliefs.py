@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from math import hypot, isclose, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from pydantic import NonNegativeFloat
@@ -42,13 +41,15 @@ class Sensors(Frozen):
         return self != Sensors()
 
 
-class Beliefs(NamedTuple):
+class Beliefs(Frozen):
     """All that an estimate of the robot's state stands on."""
 
     prediction: Prediction = Prediction()
     sensors: Sensors | None = None  # None: what is measured is taken as it is
-    unmodelled: float = 0.0  # [N] standard deviation of a force that no model knows, anew in every control period
-    drift: float = 0.0  # [N/√s] of a force that stays, and wanders; 0: there is none
+    unmodelled: NonNegativeFloat = (
+        1.0  # [N] standard deviation of a force that no model knows, anew in every control period
+    )
+    drift: NonNegativeFloat = 0.0  # [N/√s] of a force that stays, and wanders; 0: there is none
 
 
 def prediction_of(features: Sequence[Feature]) -> Prediction:

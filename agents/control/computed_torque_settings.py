@@ -87,7 +87,12 @@ class ComputedTorqueSettings(ControllerSettings):
             raise ValueError(
                 "'predict: scenario' and 'observe: scenario' need the features of an environment: see informed"
             )
-        beliefs = Beliefs(self.predict or Prediction(), self.observe, self.unmodelled[0], self.drift[0])
+        beliefs = Beliefs(
+            prediction=self.predict or Prediction(),
+            sensors=self.observe,
+            unmodelled=self.unmodelled[0],
+            drift=self.drift[0],
+        )
         return ObserverTorque(layout, frequency, period, beliefs, self.known)
 
     def candidates(self) -> Sequence[Self]:

@@ -58,7 +58,7 @@ class Estimator:
         self.lag = lag_of(beliefs.prediction.lag, period)
         self._drive = DrivenRobots(robot, robot_parameters(robot, model.dynamics), period).after
         self._driven, self._joints, self._delay = layout.robot.driven_indices, 2 * robot.caster_count, delay
-        self._observes, self._drifts = beliefs.sensors is not None, beliefs.drift > 0.0
+        self.observes, self._drifts = beliefs.sensors is not None, beliefs.drift > 0.0
         self._gains = observer_gains(model, period, beliefs)
         rates = next(part for part in layout.parts if part.name == "joint_rates")
         self._rims: Array = 1.0 / rates.scale  # [m] by which joint rates become speeds
@@ -88,10 +88,10 @@ class Estimator:
         measured = self._measured(observations)
         if self._moved is not None:
             held, self._followed = self._follow(self._waiting[0], self._followed)
-            if self._observes:
+            if self.observes:
                 predicted = _seen_from(self._moved, self._move(self._states, held))
                 self._correct(predicted, measured, self._layout.physical(observations, "joint_rates"))
-        fresh = np.flatnonzero(self._clocks == 0) if self._observes else slice(None)
+        fresh = np.flatnonzero(self._clocks == 0) if self.observes else slice(None)
         self._states[fresh] = measured[fresh]
         self._moved = course.at(self._period)
         self._clocks += 1
