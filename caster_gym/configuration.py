@@ -39,7 +39,7 @@ class Frozen(BaseModel):
     Words and yes/no are not taken for numbers, and numbers beyond GREATEST are refused.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
     longest_list: ClassVar[int] = 1000  # items of a list or keys of a mapping in it
 

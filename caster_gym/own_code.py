@@ -11,6 +11,7 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import Any, NamedTuple
 
+from caster_gym.brief import brief
 from caster_gym.configuration import ConfigurationError, did_you_mean
 from caster_gym.own_errors import in_words
 
@@ -49,7 +50,7 @@ class OwnCode(NamedTuple):
             raise ConfigurationError(f"module {module!r} has no {name!r}; {advice}")
         if not self.fits(contents[name]):
             advice = f"; there is {' or '.join(map(repr, known))} in the same module" if known else ""
-            raise ConfigurationError(f"{reference} must be {self.wanted}, got {contents[name]!r}{advice}")
+            raise ConfigurationError(f"{reference} must be {self.wanted}, got {brief(contents[name])}{advice}")
         return contents[name]
 
 

@@ -1,9 +1,17 @@
 """Reports errors of user code in a sentence, with the file and the line."""
 
+import inspect
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
+
+from pydantic import PydanticUserError
+
+from caster_gym.brief import brief
+
+_OURS = 2  # of a traceback that belong to us: `in_own_code`, and who calls code of others within it
 
 
 class OwnCodeError(ValueError):
@@ -11,23 +19,44 @@ class OwnCodeError(ValueError):
 
 
 @contextmanager
-def in_own_code(what: str, kind: type) -> Iterator[None]:
+def in_own_code(what: str, kind: Callable[..., Any]) -> Iterator[None]:
     """Turn whatever is raised within into an OwnCodeError that begins with these words.
 
-    kind: the class whose code runs; of the lines on the way to the error, the last one in its file is named, or the
-    last one at all if none is in it.
+    kind: the class or function whose code runs. Of the lines on the way to the error, the last one in its file is
+    named, or the last one at all if none is in it; its first line if a call did not even enter it.
     """
-    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    file = getattr(sys.modules.get(getattr(kind, "__module__", "")), "__file__", None)
     try:
         yield
     except Exception as error:  # whatever the code of others does
+        here = len(traceback.extract_tb(error.__traceback__)) == _OURS
+        if here and isinstance(error, TypeError):
+            raise OwnCodeError(f"{what}: TypeError: {error} ({_beginning(kind)})") from error
         raise OwnCodeError(f"{what}: {in_words(error, file)}") from error
+
+
+def _beginning(kind: Callable[..., Any]) -> str:
+    """The file and the line where a class or function begins."""
+    try:
+        return f"{inspect.getsourcefile(kind)}, line {inspect.getsourcelines(kind)[1]}"
+    except (OSError, TypeError):  # it has no source
+        return brief(kind)
 
 
 def in_words(error: Exception, file: str | None = None, advice: str = "") -> str:
     """Kind, message, file and line of an error; see `place_of`."""
-    message = error.msg if isinstance(error, SyntaxError) else error  # whose text has the place in it too
-    return f"{type(error).__name__}: {message}{advice} ({place_of(error, file)})"
+    return f"{type(error).__name__}: {_message(error)}{advice} ({place_of(error, file)})"
+
+
+def _message(error: Exception) -> object:
+    """What an error says, without the place or the address that some say too."""
+    if isinstance(error, SyntaxError):
+        return error.msg
+    if isinstance(error, PydanticUserError):
+        if error.code == "model-field-missing-annotation":
+            return f"{error.message.partition(';')[0]}: write `name: type = value`, as in `speed: float = 1.0`"
+        return error.message
+    return error
 
 
 def place_of(error: Exception, file: str | None = None) -> str:

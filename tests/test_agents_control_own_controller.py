@@ -1,5 +1,7 @@
 """agents.control.own_controller: what a controller of a user's own gives is used, or refused by the agent's name."""
 
+import inspect
+import re
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,11 @@ def made(settings):
     return controller_of(settings, LAYOUT, 0.02, "stiff.yaml")
 
 
+class Deaf(Springs):
+    def act(self):  # type: ignore[override]
+        return HALF
+
+
 class Remembering(Springs):
     """Has a method, or something else, that is told which robots begin an episode."""
 
@@ -87,11 +94,14 @@ def test_actions_may_be_whatever_holds_the_numbers(actions):
     [
         (None, "controller must return an object with a method act, got None"),
         (3, "controller must return an object with a method act, got 3"),
-        (object(), "controller must return an object with a method act, got <object"),
+        (object(), "controller must return an object with a method act, got an object of class object$"),
         (Springs, "controller must return an object, got the class Springs itself: call it"),
         (Nameless(), "controller must return an object whose name, .*, is a text, got None as the name of"),
         (fail, r"controller: ValueError: too stiff \(.*test_agents_control_own_controller\.py, line \d+\)"),
-        (Remembering(3), r"controller gave <.*>: its reset must be a method that takes a mask of robots, got 3"),
+        (
+            Remembering(3),
+            "controller gave an object of class Remembering: its reset must be a method that takes a mask of robots",
+        ),
     ],
 )
 def test_what_is_no_controller_is_refused_by_the_name_of_the_agent(controller, message):
@@ -116,6 +126,20 @@ def test_what_are_no_actions_is_refused_by_the_name_of_the_agent(actions, messag
     controller = made(own(Springs(actions)))
     with pytest.raises(OwnCodeError, match=rf"^agent 'stiff.yaml' \(springs:Spring\): its method act:? {message}"):
         controller.act(SEEN)
+
+
+def test_a_call_that_does_not_fit_is_told_with_the_line_of_the_method():
+    here = r"test_agents_control_own_controller\.py, line"
+    with pytest.raises(OwnCodeError, match=rf"act: TypeError.* {inspect.getsourcelines(Deaf.act)[1]}\)$") as caught:
+        made(own(Deaf())).act(SEEN)
+    assert re.search(here, str(caught.value))
+
+    class Own(ControllerSettings):
+        def controller(self, layout):  # type: ignore[override]
+            return Springs()
+
+    with pytest.raises(OwnCodeError, match=rf"controller: TypeError.*{here} \d+\)$"):
+        made(Own(algorithm="springs:Spring"))
 
 
 def test_a_reset_is_passed_on_and_its_errors_are_told_by_the_name_of_the_agent():

@@ -20,3 +20,16 @@ def test_large_values_are_cut(value):
 def test_texts_are_cut_with_an_ellipsis():
     assert cut("abcdef", 6) == "abcdef"
     assert cut("abcdefg", 6) == "abcde…"
+
+
+class Silent:
+    """Says nothing of itself."""
+
+
+def test_objects_and_functions_appear_by_name_not_by_their_place_in_memory():
+    assert brief(Silent()) == "an object of class Silent"
+    assert brief([Silent]) == repr([Silent])
+    assert brief(len) == "the function len"
+    assert brief({"one": test_texts_are_cut_with_an_ellipsis}).endswith(
+        "the function test_texts_are_cut_with_an_ellipsis}"
+    )

@@ -4,6 +4,7 @@ import inspect
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from caster_gym.own_errors import OwnCodeError, in_own_code
 
@@ -38,6 +39,12 @@ def test_without_a_line_of_the_user_the_last_line_is_named():
     message = r"crate 1: ZeroDivisionError: division by zero \(.*test_own_errors\.py, line"
     with pytest.raises(OwnCodeError, match=message), in_own_code("crate 1", int):
         1 / 0  # noqa: B018
+
+
+def test_a_setting_without_a_type_is_told_how_to_write_one():
+    message = r"`stiffness = 100\.0`.*: write `name: type = value`, as in `speed: float = 1\.0` \(.*\.py, line \d+\)$"
+    with pytest.raises(OwnCodeError, match=message), in_own_code("module 'springs'", Springs):
+        type("Stiff", (BaseModel,), {"__module__": __name__, "stiffness": 100.0})
 
 
 def test_an_interruption_is_no_error_of_the_user():

@@ -12,6 +12,7 @@ from caster_gym.durable_files import write_file
 from caster_gym.report.figures import new_figure, save_figure
 from caster_gym.report.tables import markdown_table, write_csv
 from caster_gym.tasks.measuring import Metrics, Printed, shown
+from caster_gym.tasks.verdicts import verdict_of
 
 FILES = ("table.md", "scenarios.csv", "regimes.png")
 FARTHEST = 100.0  # times the best error, from which on the picture has one colour
@@ -40,7 +41,7 @@ def standings(results: Sequence[Result], how: Metrics, confidence: float) -> lis
     name, printed = compared_by(type(results[0].metrics), how)
     found = []
     for agent, group in by_agent(results).items():
-        verdicts = [how.verdict.of(one.metrics) for one in group]
+        verdicts = [verdict_of(how, one.metrics) for one in group]
         merits = np.array([one.merit for one in verdicts], dtype=np.float64)
         failed = sum(one.failures for one in verdicts) / sum(len(one.paths) for one in group)
         error = estimate(printed.factor * values_of(group, name), confidence)

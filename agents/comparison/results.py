@@ -13,6 +13,7 @@ from caster_gym.agents.comparison.validation import Validation
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.durable_files import write_file
 from caster_gym.tasks.episodes import Episodes
+from caster_gym.tasks.verdicts import measured
 
 FILES = (
     *("table.md", "episodes.csv", "summary.csv"),
@@ -47,7 +48,7 @@ def compare(contenders: Sequence[Contender], test: Batch, seed: int, settling: f
     for name, agent, of_agent in tqdm(contenders, desc="evaluating", unit="agent", disable=None):
         episodes = roll_out(agent, test, seed)
         shown.setdefault(name, episodes)
-        results.append(Result(name, of_agent, episodes.names, how.measure(episodes, settling)))
+        results.append(Result(name, of_agent, episodes.names, measured(how, episodes, settling)))
     return Compared(results, shown)
 
 

@@ -9,6 +9,7 @@ from caster_gym.agents.comparison.evaluation import Batch, bare, roll_out
 from caster_gym.agents.control.protocol import Agent
 from caster_gym.report.tables import write_csv
 from caster_gym.table_files import read_lines
+from caster_gym.tasks.verdicts import measured, verdict_of
 
 VALIDATION_SEED = 500
 
@@ -29,7 +30,7 @@ class Validation(NamedTuple):
 def verdict_on(agent: Agent, validation: Batch) -> Any:
     """How good an agent is on a batch of validation paths, always from the same starts."""
     how = bare(validation).definition.metrics
-    return how.verdict.of(how.measure(roll_out(agent, validation, VALIDATION_SEED), how.settling))
+    return verdict_of(how, measured(how, roll_out(agent, validation, VALIDATION_SEED), how.settling))
 
 
 def write_history(path: Path, history: Sequence[Validation]) -> None:

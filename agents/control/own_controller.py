@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from caster_gym.agents.control.protocol import Agent, ControllerSettings
 from caster_gym.arrays import Flags
+from caster_gym.brief import brief
 from caster_gym.control.episodes import reset_of
 from caster_gym.envs.inputs import read_actions
 from caster_gym.envs.observation import ObservationLayout
@@ -19,11 +20,11 @@ def candidates_of(settings: ControllerSettings, called: str) -> Sequence[Control
     if not settings.is_own:
         return settings.candidates()
     words = f"{_described(settings, called)}: its method candidates"
-    with in_own_code(words, type(settings)):
+    with in_own_code(words, type(settings).candidates):
         found = settings.candidates()
     listed = isinstance(found, Sequence) and all(isinstance(one, ControllerSettings) for one in found)
     if not listed or not found:
-        raise OwnCodeError(f"{words} must return a list of at least one {type(settings).__name__}, got {found!r}")
+        raise OwnCodeError(f"{words} must return a list of at least one {type(settings).__name__}, got {brief(found)}")
     return found
 
 
@@ -33,23 +34,23 @@ def controller_of(settings: ControllerSettings, layout: ObservationLayout, perio
         return settings.controller(layout, period)
     agent = _described(settings, called)
     words = f"{agent}: its method controller"
-    with in_own_code(words, type(settings)):
+    with in_own_code(words, type(settings).controller):
         controller = settings.controller(layout, period)
     if isinstance(controller, type):
         raise OwnCodeError(f"{words} must return an object, got the class {controller.__name__} itself: call it")
     if not callable(getattr(controller, "act", None)):
-        raise OwnCodeError(f"{words} must return an object with a method act, got {controller!r}")
+        raise OwnCodeError(f"{words} must return an object with a method act, got {brief(controller)}")
     with in_own_code(f"{agent}: the name of its controller", type(controller)):
         name = getattr(controller, "name", None)
     if not isinstance(name, str) or not name.strip():
         raise OwnCodeError(
-            f"{words} must return an object whose name, for tables and figures, is a text, got {name!r} as the name of "
-            f"{controller!r}"
+            f"{words} must return an object whose name, for tables and figures, is a text, got {brief(name)} as the "
+            f"name of {brief(controller)}"
         )
     try:
         reset_of(controller)
     except ValueError as error:
-        raise OwnCodeError(f"{words} gave {controller!r}: {error}") from error
+        raise OwnCodeError(f"{words} gave {brief(controller)}: {error}") from error
     return _Checked(controller, name, agent, layout)
 
 
@@ -67,13 +68,13 @@ class _Checked:
 
     def reset(self, mask: Flags) -> None:
         """New episodes of some robots begin."""
-        with in_own_code(f"{self._words} reset", type(self._agent)):
+        with in_own_code(f"{self._words} reset", self._reset):
             self._reset(mask)
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (robots, driven joints) in −1 … 1 for observations (robots, size)."""
         words = f"{self._words} act"
-        with in_own_code(words, type(self._agent)):
+        with in_own_code(words, self._agent.act):
             given = self._agent.act(observations)
         shape = (len(observations), len(self._driven))
         if given is None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from caster_gym.arrays import Flags
+from caster_gym.brief import brief
 
 
 def reset_of(agent: Any) -> Callable[[Flags], object]:
@@ -16,7 +17,7 @@ def reset_of(agent: Any) -> Callable[[Flags], object]:
         return _nothing
     reset: Callable[[Flags], object] = agent.reset
     if not callable(reset):
-        raise ValueError(f"its reset must be a method that takes a mask of robots, got {reset!r}")
+        raise ValueError(f"its reset must be a method that takes a mask of robots, got {brief(reset)}")
     return reset
 
 

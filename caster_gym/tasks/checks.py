@@ -5,6 +5,7 @@ from collections.abc import Callable
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+from caster_gym.brief import brief
 from caster_gym.envs.report import Endings, Record, Situation
 from caster_gym.envs.tracking import Errors, Moment, Reference
 from caster_gym.mechanics.integration import State
@@ -47,7 +48,7 @@ def _check(task: "Task", name: str, function: Callable[[Any, Any], Any], kind: A
             raise OwnCodeError(f"{said} gives {given}, and must give {_tuple(kind)}, which the task declares")
         for field, value in zip(kind._fields, given, strict=True):
             if not isinstance(value, Real | _Tried):
-                raise OwnCodeError(f"{said} must give a number as {field!r}, and gives {value!r}")
+                raise OwnCodeError(f"{said} must give a number as {field!r}, and gives {brief(value)}")
             number = value.value if isinstance(value, _Tried) else value
             if not math.isfinite(number):
                 raise OwnCodeError(

@@ -3,11 +3,12 @@
 import sys
 from typing import TYPE_CHECKING, Any, get_args
 
+from caster_gym.brief import brief
 from caster_gym.configuration import ConfigurationError, did_you_mean
 from caster_gym.envs.observation import PreviewUnit
 from caster_gym.own_code import import_own
 from caster_gym.own_errors import OwnCodeError
-from caster_gym.tasks.measuring import Printed, shown
+from caster_gym.tasks.measuring import Metrics, Printed, shown
 from caster_gym.tasks.parameters import TaskParameters
 from caster_gym.tasks.registry import TASKS, classes_of
 
@@ -37,12 +38,16 @@ def check_names(task: "Task") -> None:
         units = " or ".join(map(repr, get_args(PreviewUnit)))
         raise OwnCodeError(f"{said}: its preview_unit must be {units}, got {task.preview_unit!r}")
     if not (isinstance(task.purpose, str) and task.purpose.strip()):
-        raise OwnCodeError(f"{said}: its purpose must say in words what a robot is to do, got {task.purpose!r}")
+        raise OwnCodeError(f"{said}: its purpose must say in words what a robot is to do, got {brief(task.purpose)}")
     if not (isinstance(task.parameters, type) and issubclass(task.parameters, TaskParameters)):
-        raise OwnCodeError(f"{said}: its parameters must be a subclass of TaskParameters, got {task.parameters!r}")
+        raise OwnCodeError(f"{said}: its parameters must be a subclass of TaskParameters, got {brief(task.parameters)}")
     for part in ("source", "weights", "terms"):
         if not getattr(getattr(task, part), "_fields", ()):
-            raise OwnCodeError(f"{said}: its {part} must be a named tuple with fields, got {getattr(task, part)!r}")
+            raise OwnCodeError(f"{said}: its {part} must be a named tuple, got {brief(getattr(task, part))}")
+    if not isinstance(task.metrics, Metrics):
+        raise OwnCodeError(f"{said}: its metrics must be made by tasks.measuring.Metrics, got {brief(task.metrics)}")
+    if not callable(task.metrics.measure):
+        raise OwnCodeError(f"{said}: its metrics' `measure` must be a function, got {brief(task.metrics.measure)}")
     _check_verdict(said, task.metrics.verdict)
 
 
@@ -74,7 +79,7 @@ def class_of(task: "Task", suffix: str, parent: type) -> Any:
         what = f"; {did_you_mean(name, similar)}" if similar else ""
         raise ConfigurationError(
             f"task {task.name!r} needs a class {name}({parent.__name__}) with `definition = TASK` in "
-            f"{getattr(sys.modules[module], '__file__', module)}, got {found!r}{what}"
+            f"{getattr(sys.modules[module], '__file__', module)}, got {brief(found)}{what}"
         )
     belongs: Task | None = getattr(found, "definition", None)
     if belongs is None or belongs.environment != task.environment:
