@@ -231,7 +231,7 @@ def test_a_task_of_ones_own_is_compiled_and_after_an_edit_anew(tmp_path):
         ),
         (
             ("weights=Weights", "weights=float"),
-            r"task 'slow': its weights must be a named tuple with fields, got <class",
+            r"task 'slow': its weights must be a named tuple, got <class",
         ),
         (
             ("parameters=TRACK.parameters", "parameters=dict"),
