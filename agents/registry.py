@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
+from caster_gym.agents.control.predictive import PredictiveSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import LearnerSettings, PPOSettings, RslPPOSettings, SACSettings, SHACSettings
 from caster_gym.configuration import ConfigurationError, parse, read_yaml
@@ -19,6 +20,7 @@ from caster_gym.shipped_files import find
 
 AGENTS: Mapping[str, type[AgentSettings]] = {
     "computed torque": ComputedTorqueSettings,
+    "predictive": PredictiveSettings,
     "ppo": PPOSettings,
     "sac": SACSettings,
     "rsl_ppo": RslPPOSettings,

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from caster_gym import mechanics, wrappers
     from caster_gym.agents.control.computed_torque import ComputedTorque
     from caster_gym.agents.control.observer_torque import ObserverTorque
+    from caster_gym.agents.control.predictive import PredictiveControl
     from caster_gym.agents.learning.bundle import load_policy
     from caster_gym.agents.learning.sb3_environment import SB3VecEnv
     from caster_gym.arena.arena import Arena
@@ -51,6 +52,7 @@ __all__ = [
     "ObservationLayout",
     "ObserverTorque",
     "PeriodDerivatives",
+    "PredictiveControl",
     "Robot",
     "SB3VecEnv",
     "TorchFleet",
@@ -85,6 +87,7 @@ _HOMES = {
     "ObservationLayout": "caster_gym.envs.observation",
     "ObserverTorque": "caster_gym.agents.control.observer_torque",
     "PeriodDerivatives": "caster_gym.engines.native.derivatives",
+    "PredictiveControl": "caster_gym.agents.control.predictive",
     "Robot": "caster_gym.robot",
     "SB3VecEnv": "caster_gym.agents.learning.sb3_environment",
     "TorchFleet": "caster_gym.engines.tensor.fleet",

@@ -31,6 +31,7 @@ NAMES = [
     "ObservationLayout",
     "ObserverTorque",
     "PeriodDerivatives",
+    "PredictiveControl",
     "Robot",
     "SB3VecEnv",
     "TorchFleet",

@@ -60,7 +60,10 @@ def test_what_is_installed_imports_nothing_that_is_not():
 
 
 ALL = modules("caster_gym", "agents", "papers", "scripts", "tests")
-MADE_UP = ("caster_gym.tasks.mine", "configs/tasks/mine.yaml", "tests/test_tasks_mine.py")  # by who follows a recipe
+MADE_UP = (  # by who follows a recipe
+    *("caster_gym.tasks.mine", "configs/tasks/mine.yaml", "tests/test_tasks_mine.py"),
+    *("agents/control/springs.py", "configs/agents/spring.yaml", "tests/test_agents_control_springs.py"),
+)
 DOTTED = re.compile(r"(?<![\w.])(?:caster_gym|papers|scripts|tests)(?:\.[A-Za-z]\w*)+(?!\.?\w)")
 TOPS = "caster_gym|agents|papers|scripts|tests|configs|docs"
 SLASHED = re.compile(rf"(?<![\w/.])(?:{TOPS})/[\w/.-]*\.(?:py|yaml|md|csv)\b")
