@@ -39,7 +39,7 @@ class Frozen(BaseModel):
     Words and yes/no are not taken for numbers, and numbers beyond GREATEST are refused.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     longest_list: ClassVar[int] = 1000  # items of a list or keys of a mapping in it
 
@@ -64,6 +64,12 @@ class Frozen(BaseModel):
             if problems:
                 raise ValidationError.from_exception_data(cls.__name__, problems)
         return model
+
+
+class Extensible(Frozen):
+    """Parameters to which users add fields in classes of their own: the defaults of these are checked too."""
+
+    model_config = ConfigDict(validate_default=True)
 
 
 class ConfigurationError(ValueError):

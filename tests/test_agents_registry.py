@@ -6,15 +6,18 @@ from typing import Any
 
 import pytest
 import yaml
+from pydantic import PositiveFloat
 
 import caster_gym
 from caster_gym.agents.control.computed_torque_settings import ComputedTorqueSettings
 from caster_gym.agents.control.protocol import AgentSettings, ControllerSettings
 from caster_gym.agents.learning.settings import PPOSettings, SACSettings
 from caster_gym.agents.registry import read_agent
-from caster_gym.configuration import ConfigurationError
+from caster_gym.configuration import ConfigurationError, parse
 from caster_gym.own_code import RESULTS
 from caster_gym.shipped_files import find, names_of
+from caster_gym.tasks.track.parameters import TrackParameters
+from caster_gym.wrappers.feature import Feature
 
 
 def written(tmp_path, content):
@@ -186,3 +189,18 @@ def test_no_code_is_run_for_a_file_among_results(own, tmp_path, result):
     with pytest.raises(ConfigurationError, match="is a folder of results, from which no code is run"):
         own("OWN:Resting")
     assert f"own_{tmp_path.name}" not in sys.modules
+
+
+@pytest.mark.parametrize("base", [ControllerSettings, TrackParameters, Feature])
+def test_defaults_of_a_users_own_fields_are_checked(base):
+    class Own(base):  # type: ignore[misc, valid-type]
+        stiffness: PositiveFloat = -100.0
+
+        def controller(self, layout, period): ...
+
+        def runtime(self, place): ...
+
+    content = {"algorithm": "springs:Own"} if base is ControllerSettings else {}
+    with pytest.raises(ConfigurationError, match=r"settings: 'stiffness' should be greater than 0, got -100\.0"):
+        parse(Own, content, "settings")
+    assert parse(Own, {**content, "stiffness": 3.0}, "settings").stiffness == 3.0

@@ -10,7 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Extensible
 from caster_gym.envs.observation import ObservationLayout
 from caster_gym.wrappers.feature import Feature
 
@@ -36,7 +36,7 @@ class Agent(Protocol):
         ...
 
 
-class AgentSettings(Frozen):
+class AgentSettings(Extensible):
     """Settings of an agent, as its YAML file gives them."""
 
     algorithm: str  # a name in caster_gym.agents.registry, or module:Name of a class like this one

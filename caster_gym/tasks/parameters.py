@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, NonNegativeFloat, field_validator, model_validator
 
-from caster_gym.configuration import Frozen, Positive
+from caster_gym.configuration import Extensible, Positive
 from caster_gym.engines.time_step import MOST_SUBSTEPS, SHORTEST_PERIOD
 from caster_gym.floor import Floor
 
@@ -15,7 +15,7 @@ Horizons: TypeAlias = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1000.0)]
 Turn: TypeAlias = Annotated[float, Field(ge=0.0, le=3.1416)]  # [rad] either way
 
 
-class TaskParameters(Frozen):
+class TaskParameters(Extensible):
     """How a path is to be walked, and what that costs; a task adds its own fields, among them `preview`."""
 
     usual_names: ClassVar[Mapping[str, str]] = {

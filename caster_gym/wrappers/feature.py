@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator
 
 from caster_gym.arrays import Array, Flags, Indices, Seeds
-from caster_gym.configuration import Frozen
+from caster_gym.configuration import Extensible
 from caster_gym.states import AnyState, State
 from caster_gym.wrappers.memory import check_memory, read_memory, set_memory
 
@@ -166,7 +166,7 @@ class PushingRuntime(Runtime, ABC):
         """Wrenches at C in B (robots, 3) during the coming control period. [N, N, N m]"""
 
 
-class Feature(Frozen):
+class Feature(Extensible):
     """Something that an environment does differently, told in numbers with units."""
 
     redefines_actions: ClassVar[bool] = False
