@@ -7,17 +7,20 @@ from pathlib import Path
 from caster_gym.report.pages import between_marks
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = ("table.md", "summary.csv", "run.yaml", "overview.png")  # and all other figures
+ALWAYS = ("table.md", "run.yaml")
+OF_ONE = ("summary.csv", "overview.png")  # of a comparison on one task; and all other figures
+OF_SCENARIOS = ("scenarios.csv", "tuning.csv", "regimes.png")  # of one under several scenarios
 
 
 def publish(run: Path, name: str) -> None:
     """Copy tables and figures of a finished comparison, and set its table between README's marks."""
-    missing = [file for file in FILES if not (run / file).is_file()]
+    files = (*ALWAYS, *(OF_SCENARIOS if (run / "regimes.png").is_file() else OF_ONE))
+    missing = [file for file in files if not (run / file).is_file()]
     if missing:
         raise SystemExit(f"{run} lacks {', '.join(missing)}; run `make benchmark` first")
     target = ROOT / "docs" / "benchmark" / name
     target.mkdir(parents=True, exist_ok=True)
-    for file in {run / name for name in FILES} | set(run.glob("*.png")):
+    for file in {run / name for name in files} | set(run.glob("*.png")):
         shutil.copyfile(file, target / file.name)
     readme = ROOT / "README.md"
     begin, end = f"<!-- table {name}: begin -->\n", f"<!-- table {name}: end -->"

@@ -109,7 +109,12 @@ class PredictiveControl:
         torques = np.einsum("rkm,jm->rkj", plans, self._spread)  # the same for a robot alone and in a batch
         path[0] = states
         for k in range(self.horizon):
-            path[k + 1], by_state[k], by_torque[k], _ = self._derivatives.at(path[k], torques[:, k])
+            end, by_state[k], by_torque[k], _ = self._derivatives.at(path[k], torques[:, k])
+            directions = end[:, 7:].reshape(len(end), -1, 2)
+            directions *= 1.5 - 0.5 * np.square(directions).sum(
+                axis=-1, keepdims=True
+            )  # of casters that flip in a step
+            path[k + 1] = end
         low, high = self._limits(path[:-1])
         improve(plans, Linearised(path, by_state, by_torque), self._spread, low, high, wanted, self._costs)
 
@@ -181,9 +186,10 @@ def _points_for(layout: ObservationLayout, horizon: float) -> tuple[float, ...]:
     points = sorted(layout.preview)
     if not points or points[-1] < horizon * (1.0 - 1e-9):
         shown = f"{points[-1]:g} s" if points else "nothing"
+        shorter = "it a shorter 'horizon', or " if points else ""
         raise ValueError(
-            f"predictive control plans {horizon:g} s ahead, and observations preview {shown}: give it a shorter "
-            "'horizon', or the task a longer 'preview'"
+            f"predictive control plans {horizon:g} s ahead, and observations preview {shown}: give {shorter}the task a "
+            "longer 'preview'"
         )
     last = next(i for i, point in enumerate(points) if point >= horizon * (1.0 - 1e-9))
     return tuple(points[: last + 1])
