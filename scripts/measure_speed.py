@@ -16,6 +16,7 @@ from caster_gym.report.provenance import command_line
 from caster_gym.report.run_folder import check_can_be_made
 from caster_gym.report.tables import write_csv
 from scripts.speed_accuracy import measure_accuracy
+from scripts.speed_control import control_rows
 from scripts.speed_growth import draw_growth, growth_rows
 from scripts.speed_limits import operations_of_a_step
 from scripts.speed_page import Occasion, page
@@ -50,6 +51,11 @@ def sections(robot: Robot, name: str, cores: int, seconds: float, quick: bool) -
             environment_rows(name, cores, seconds),
         ),
         ("One robot", "The time of one step.", single_rows(name, seconds)),
+        (
+            "Model-based control",
+            """The time that one robot's action takes on one core, of those who act every 20 ms.""",
+            control_rows(robot, seconds),
+        ),
         (
             "Peers",
             """MuJoCo simulates the same robot as rigid bodies, and nothing else. The other rows are whole environments;

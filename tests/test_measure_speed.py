@@ -8,6 +8,7 @@ import pytest
 from caster_gym import load_robot
 from caster_gym.arena import Arena
 from scripts.speed_accuracy import measure_accuracy
+from scripts.speed_control import control_rows
 from scripts.speed_growth import field, growth_table, line, with_casters
 from scripts.speed_limits import Counted, limits_text, operations_of_a_step
 from scripts.speed_page import RATIOS, Occasion, page
@@ -183,6 +184,7 @@ def sections():
     """All rows that need no process and no compiler of their own."""
     name = "chung2008"
     ours = [*bare_rows(ROBOT, 1, 1e-9), *environment_rows(name, 1, 1e-9), *single_rows(name, 1e-9)]
+    ours += control_rows(ROBOT, 1e-9)
     return [("Ours", "Ours.", ours), ("Peers", "Theirs.", peer_rows(ROBOT, name, 1, 1e-9))]
 
 
