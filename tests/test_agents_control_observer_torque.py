@@ -16,7 +16,7 @@ from caster_gym.envs.observation import ObservationLayout
 from caster_gym.robot import load_robot
 from caster_gym.tasks.track.environment import CasterTrackVectorEnv
 from caster_gym.tasks.track.metrics import measure
-from caster_gym.wrappers import ActionDelay, MotorLag, SensorNoise, wrap
+from caster_gym.wrappers import ActionDelay, DroppedPackets, MotorLag, SensorNoise, wrap
 
 COUNT = 8
 PERIOD = 0.02
@@ -80,7 +80,7 @@ def test_the_course_of_the_reference_is_where_it_will_be():
     for ahead, exactness in ((2, 2e-6), (8, 2e-5)):  # [m], [rad] of a quartic up to 0.1 s and of a cubic up to 0.2 s
         for k in range(20, 50, 10):
             now, later = infos[k]["reference_pose"], infos[k + ahead]["reference_pose"]
-            place = course_of(agent.layout, rows[k][0], 0.2).at(ahead * PERIOD).place
+            place = course_of(agent.layout, rows[k][0], 0.2).at(np.full(COUNT, ahead * PERIOD)).place
             turn = np.arctan2(later[:, 3], later[:, 2]) - np.arctan2(now[:, 3], now[:, 2])
             x, y = (later - now)[:, :2].T
             expected = [now[:, 2] * x + now[:, 3] * y, now[:, 2] * y - now[:, 3] * x]
@@ -113,6 +113,17 @@ def test_an_observer_halves_what_noise_costs_with_calmer_torques():
     mine, theirs = (measure(roll_out(one, env, seed=5), 1.0) for one in (agent, plain))
     assert np.median(theirs.position_rmse / mine.position_rmse) > 2.0
     assert np.median(theirs.torque_variation / mine.torque_variation) > 5.0
+
+
+def test_an_observer_bridges_observations_that_get_lost():
+    """A fifth of them: it moves on by its model, where computed torque acts on a place that is 1 cm behind."""
+    beliefs = Beliefs(sensors=Sensors(**NOISE), unmodelled=0.1)
+    env, agent = make(SensorNoise.model_validate(NOISE), DroppedPackets(probability=0.2), beliefs=beliefs)
+    whole, _ = make(SensorNoise.model_validate(NOISE))
+    mine, best = position_errors(env, agent), position_errors(whole, agent)
+    plain = position_errors(env, ComputedTorque(agent.layout, 10.0, PERIOD))
+    assert np.median(mine / best) < 1.3
+    assert np.median(plain / mine) > 3.0
 
 
 @pytest.mark.parametrize("noise", [{}, NOISE])

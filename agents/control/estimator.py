@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from caster_gym.agents.control.beliefs import Beliefs
 from caster_gym.agents.control.observer_gains import observer_gains
 from caster_gym.agents.control.planar import angle_between, short_way, turned, turned_direction
-from caster_gym.agents.control.reference_ahead import Ahead, Course, course_of
+from caster_gym.agents.control.reference_ahead import Ahead, course_of
 from caster_gym.arrays import Array, Flags
 from caster_gym.engines.native.driven import DrivenRobots
 from caster_gym.engines.numpy_model import Model
@@ -59,6 +59,7 @@ class Estimator:
         self._drive = DrivenRobots(robot, robot_parameters(robot, model.dynamics), period).after
         self._driven, self._joints, self._delay = layout.robot.driven_indices, 2 * robot.caster_count, delay
         self.observes, self._drifts = beliefs.sensors is not None, beliefs.drift > 0.0
+        self._noisy = beliefs.sensors is not None and beliefs.sensors.noisy
         self._gains = observer_gains(model, period, beliefs)
         rates = next(part for part in layout.parts if part.name == "joint_rates")
         self._rims: Array = 1.0 / rates.scale  # [m] by which joint rates become speeds
@@ -73,7 +74,9 @@ class Estimator:
             self._wrenches = np.zeros((self._count, 3))
             self._waiting = np.zeros((self._delay + 1, self._count, len(self._driven)))  # the oldest first
             self._followed = np.zeros((self._count, len(self._driven)))
-            self._moved: Ahead | None = None  # how far the reference is now from where it was at the last look
+            self._shown = np.zeros((self._count, self._layout.size), dtype=np.float32)
+            self._ages = np.zeros(self._count)  # [control periods] of what is shown
+            self._moved: Ahead | None = None  # where the reference is a period later, seen from where it is shown
         self._clocks[mask], self._wrenches[mask], self._followed[mask] = 0, 0.0, 0.0
         self._waiting[:, mask] = 0.0
 
@@ -84,30 +87,36 @@ class Estimator:
                 f"a controller that remembers {self._count} robots got observations of {len(observations)}: call its "
                 "method reset first, with a mask of all of them"
             )
-        course = course_of(self._layout, observations, self._horizon + self._period)
-        measured = self._measured(observations)
+        shown = observations[:, : self._layout.size]
+        lost = self._noisy & (self._clocks > 0) & (shown == self._shown).all(axis=1)  # noise never repeats itself
+        self._shown, self._ages = shown.copy(), np.where(lost, self._ages + 1.0, 0.0)
+        passed = self._period * self._ages
+        course = course_of(self._layout, shown, passed.max() + self._horizon + self._period)
+        measured = self._measured(shown)
         if self._moved is not None:
             held, self._followed = self._follow(self._waiting[0], self._followed)
             if self.observes:
-                predicted = _seen_from(self._moved, self._move(self._states, held))
-                self._correct(predicted, measured, self._layout.physical(observations, "joint_rates"))
+                moved = self._move(self._states, held)
+                rates = self._layout.physical(shown, "joint_rates")
+                pushed = self._correct(_seen_from(self._moved, moved), measured, rates)
+                self._states[lost], pushed[lost] = moved[lost], 0.0
+                self._wrenches += pushed
         fresh = np.flatnonzero(self._clocks == 0) if self.observes else slice(None)
         self._states[fresh] = measured[fresh]
-        self._moved = course.at(self._period)
+        self._moved = course.at(passed + self._period)
         self._clocks += 1
-        return self._predict(course)
+        return self._predict(course.at(passed + self._horizon))
 
     def sent(self, actions: NDArray[np.float32]) -> None:
         """Actions (robots, motors) that were sent after the last look."""
         self._waiting[:-1] = self._waiting[1:]
         self._waiting[-1] = actions
 
-    def _predict(self, course: Course) -> Sight:
+    def _predict(self, ahead: Ahead) -> Sight:
         state, followed = self._states, self._followed
         for action in self._waiting[1:]:
             held, followed = self._follow(action, followed)
             state = self._move(state, held)
-        ahead = course.at(self._horizon)
         cos, sin, twist = state[:, 2], state[:, 3], state[:, 4:BODY_ROWS]
         error = turned(ahead.place - np.column_stack([state[:, :2], np.arctan2(sin, cos)]), cos, -sin)
         error[:, 2] = short_way(error[:, 2])
@@ -144,8 +153,8 @@ class Estimator:
         commands[:, self._driven] = shares
         return self._drive(states, commands, self._wrenches)
 
-    def _correct(self, predicted: Array, measured: Array, joint_rates: Array) -> None:
-        """Weigh what was predicted and what is measured, and learn of the disturbance from their difference. (X8)"""
+    def _correct(self, predicted: Array, measured: Array, joint_rates: Array) -> Array:
+        """Weigh what was predicted and what is measured; returns what their difference adds to the disturbance. (X8)"""
         states, cos, sin = predicted.copy(), predicted[:, 2], predicted[:, 3]
         was, shown = (one[:, BODY_ROWS:].reshape(len(one), -1, 2) for one in (predicted, measured))
         directions = turned_direction(was, self._gains.steering * angle_between(was, shown))
@@ -162,8 +171,9 @@ class Estimator:
         states[:, 2:4] = turned_direction(predicted[:, 2:4], shift[:, 2])
         states[:, 4:BODY_ROWS] += faster
         self._states = states
-        if self._drifts:
-            self._wrenches += (self._model.inertia(_steering(states)) @ pushed[..., None])[..., 0]  # (X9)
+        if not self._drifts:
+            return np.zeros_like(pushed)
+        return np.asarray((self._model.inertia(_steering(states)) @ pushed[..., None])[..., 0])  # (X9)
 
     def _counted(self, steering: Array, joint_rates: Array) -> Array:
         """Twists (robots, 3) by least squares of the speeds of rims and pivots that joint rates (robots, 2 N) are."""

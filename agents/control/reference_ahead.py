@@ -26,13 +26,14 @@ class Ahead(NamedTuple):
 class Course(NamedTuple):
     """The reference from now on, piece by piece: derivatives (pieces, 5, robots, 3) at the start of each."""
 
-    starts: tuple[float, ...]  # [s]
+    starts: Array  # (pieces,) [s]
     pieces: Array
 
-    def at(self, time: float) -> Ahead:
-        """Where the reference is after some time [s]."""
-        number = max(i for i, start in enumerate(self.starts) if start <= time or i == 0)
-        t, (p, v, a, j, s) = time - self.starts[number], self.pieces[number]
+    def at(self, times: Array) -> Ahead:
+        """Where the references of all robots are after some times (robots,). [s]"""
+        number = np.maximum(np.searchsorted(self.starts, times, side="right") - 1, 0)
+        t = (times - self.starts[number])[:, None]
+        p, v, a, j, s = np.moveaxis(self.pieces[number, :, np.arange(len(times))], 1, 0)
         return Ahead(
             p + t * (v + t / 2.0 * (a + t / 3.0 * (j + t / 4.0 * s))),  # (X1)
             v + t * (a + t / 2.0 * (j + t / 3.0 * s)),
@@ -76,5 +77,5 @@ def course_of(layout: ObservationLayout, observations: NDArray[np.float32], unti
         place, velocity = there, speed
         starts.append(horizon)
     if not pieces:
-        return Course((0.0,), np.array([(zero, velocity, acceleration, zero, zero)]))
-    return Course(tuple(starts[:-1]), np.array(pieces))
+        return Course(np.zeros(1), np.array([(zero, velocity, acceleration, zero, zero)]))
+    return Course(np.array(starts[:-1]), np.array(pieces))
