@@ -1,4 +1,7 @@
-"""Put the results of a comparison where readers see them: docs/benchmark/NAME/ and the table NAME in README.md."""
+"""Put the results of a comparison where readers see them: docs/benchmark/NAME/ and the table NAME in README.md.
+
+Of one under several scenarios README shows the map, which is a picture; every episode goes into episodes/SCENARIO.csv.
+"""
 
 import argparse
 import shutil
@@ -14,7 +17,8 @@ OF_SCENARIOS = ("scenarios.csv", "tuning.csv", "regimes.png")  # of one under se
 
 def publish(run: Path, name: str) -> None:
     """Copy tables and figures of a finished comparison, and set its table between README's marks."""
-    files = (*ALWAYS, *(OF_SCENARIOS if (run / "regimes.png").is_file() else OF_ONE))
+    scenarios = sorted(file.parent for file in run.glob("*/episodes.csv"))
+    files = (*ALWAYS, *(OF_SCENARIOS if scenarios else OF_ONE))
     missing = [file for file in files if not (run / file).is_file()]
     if missing:
         raise SystemExit(f"{run} lacks {', '.join(missing)}; run `make benchmark` first")
@@ -22,6 +26,11 @@ def publish(run: Path, name: str) -> None:
     target.mkdir(parents=True, exist_ok=True)
     for file in {run / name for name in files} | set(run.glob("*.png")):
         shutil.copyfile(file, target / file.name)
+    for scenario in scenarios:
+        (target / "episodes").mkdir(exist_ok=True)
+        shutil.copyfile(scenario / "episodes.csv", target / "episodes" / f"{scenario.name}.csv")
+    if scenarios:
+        return
     readme = ROOT / "README.md"
     begin, end = f"<!-- table {name}: begin -->\n", f"<!-- table {name}: end -->"
     table = (run / "table.md").read_text(encoding="utf-8")

@@ -21,8 +21,9 @@ def test_there_are_comparisons():
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.parent.name)
 def test_settings_are_those_that_the_package_has_today(run):
     facts = yaml.safe_load(run.read_text(encoding="utf-8"))
+    ends = [f"_for_{scenario}" for scenario in facts["benchmark"].get("scenarios") or {}]
     for name, settings in facts["agents"].items():
-        today = read_agent(name)
+        today = read_agent(next((name.removesuffix(end) for end in ends if name.endswith(end)), name))
         assert parse(type(today), settings, f"{run}: {name}") == today
     name = facts["benchmark"]["task"]
     assert parse(TaskSettings, facts["task"], f"{run}: task") == read_settings(TaskSettings, "tasks", name)
