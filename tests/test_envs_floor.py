@@ -72,10 +72,7 @@ def test_a_batch_equals_single_environments(task):
     assert_a_batch_equals_single_environments(task, 6, floor=ISLANDS, corridor=0.04, start_offset=0.02)
 
 
-@pytest.mark.parametrize(
-    ("task", "floor"),
-    [("track", "grip"), ("follow", ISLANDS), pytest.param("track", ISLANDS, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("task", "floor"), [("track", "grip"), ("follow", ISLANDS)])
 def test_a_batch_equals_single_environments_among_obstacles(task, floor):
     """Thrown at walls and pillars: impacts, in which wheels slip where friction is finite, and lasting contacts."""
     hits = assert_a_batch_equals_single_environments(task, 4, 20, 1.5, floor=floor, arena=OBSTACLES, corridor=0.6)
